@@ -106,7 +106,7 @@ pub struct Site {
     pub height: f64,
     /// Magnitude of gravity in m/s², including the centrifugal part.
     pub gravity: f64,
-    /// Its 1σ in m/s². The scale factors of all three accelerometers share its error.
+    /// 1σ in m/s². The scale factors of all three accelerometers share its error.
     pub gravity_sigma: f64,
     /// Whether the site is known; if not, Earth rotation is zero with the σ of [`Site::earth_rate_sigma`].
     #[serde(default = "known")]

@@ -125,11 +125,11 @@ pub struct Condition {
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 #[serde(expecting = "name, serial number and certificate as three strings in quotes")]
 pub struct Equipment {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// Its serial number.
+    /// Serial number.
     pub serial: String,
-    /// Its certificate.
+    /// Certificate.
     pub certificate: String,
 }
 
@@ -198,7 +198,7 @@ pub struct Issue {
     pub received: Option<Day>,
     /// First day of the calibration.
     pub begin: Day,
-    /// Its last day.
+    /// Last day.
     pub end: Day,
     /// Place of the calibration.
     pub place: Place,
@@ -210,15 +210,15 @@ pub struct Issue {
 pub struct Item {
     /// Description, such as `inertial measurement unit`.
     pub name: String,
-    /// Its manufacturer.
+    /// Manufacturer.
     pub manufacturer: Option<String>,
-    /// Its model.
+    /// Model.
     #[serde(default)]
     pub model: String,
-    /// Its serial number.
+    /// Serial number.
     #[serde(default)]
     pub serial: String,
-    /// Its state when received.
+    /// State when received.
     pub state: String,
 }
 

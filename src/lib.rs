@@ -1,4 +1,4 @@
-//! Calibration of an inertial measurement unit on a turntable: scale factors K, installation matrix E and
+//! Calibration of an inertial measurement unit on a turntable: scale factors K, misalignment matrix E and
 //! biases D of gyros and accelerometers, with a σ of each.
 //!
 //! An error-state extended Kalman filter runs a strapdown navigation solution through a recording and estimates the

@@ -37,7 +37,7 @@ pub struct TermLeftOff {
 }
 
 /// The covariance of a chain linearised at the truth, with the noise and the error terms of the problem as stated and with
-/// `terms` the true ones, in the installation form of the truth: the inverse of the Bayesian information matrix for
+/// `terms` the true ones, in the misalignment form of the truth: the inverse of the Bayesian information matrix for
 /// Gaussian noise (Van Trees, *Detection, Estimation, and Modulation Theory*, part I, §2.4.3). The initial attitude is
 /// that of the first reading or the coarse start: arc seconds of tilt and arc minutes of heading have no effect on the
 /// covariance.
@@ -124,7 +124,7 @@ pub fn terms_left_off(
     Ok(left_off.collect())
 }
 
-/// The problem in the installation form of a truth, with stated noise.
+/// The problem in the misalignment form of a truth, with stated noise.
 fn at_truth<'a>(problem: &Problem<'a>, truth: &PerSensor<Triad>) -> Problem<'a> {
     problem.with(|model| *model = model.in_form(problem.run(), truth.gyro.form))
 }

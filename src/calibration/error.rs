@@ -33,9 +33,9 @@ pub enum CalibrationError {
          the campaign, or calibrate it separately"
     )]
     NoTemperature {
-        /// Its name.
+        /// Name.
         recording: String,
-        /// Its number, from one.
+        /// Number, from one.
         number: usize,
     },
     /// No dwell.
@@ -67,8 +67,8 @@ pub enum CalibrationError {
     },
     /// Every labelled section contradicts its label.
     #[error(
-        "no labelled section matches its label: {}. Correct [segments], or remove it so that turncal uses every \
-         dwell and turn", .contradicted.iter().map(LabelCheck::to_string).collect::<Vec<_>>().join("; ")
+        "no labelled section matches its label: {}. Correct [segments], or remove [segments] so that turncal uses \
+         every dwell and turn", .contradicted.iter().map(LabelCheck::to_string).collect::<Vec<_>>().join("; ")
     )]
     LabelsContradicted {
         /// The contradicted sections.
@@ -114,7 +114,7 @@ pub enum ComparisonError {
         sensor: Sensor,
         /// The first record that states a unit.
         name: String,
-        /// Its unit.
+        /// Unit.
         expected: String,
         /// The record that states another one.
         other: String,
@@ -138,7 +138,7 @@ pub enum ComparisonError {
     /// Mismatch of `parameters` and `covariance`.
     #[error(
         "{name}: covariance needs one row and one column per entry of parameters, and each entry must be a parameter \
-         of the installation form. Write the calibration again"
+         of the misalignment form. Write the calibration again"
     )]
     Covariance {
         /// The record.

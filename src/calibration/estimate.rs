@@ -68,7 +68,7 @@ impl Estimate {
         all
     }
 
-    /// The installation form, one for both triads.
+    /// The misalignment form, one for both triads.
     pub fn form(&self) -> InstallationForm {
         self.triads.gyro.form
     }

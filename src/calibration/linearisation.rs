@@ -23,7 +23,7 @@ pub struct Linearisation {
     pub triads: PerSensor<Triad>,
     /// Parameters of its error terms.
     pub terms: TermVector,
-    /// Its temperature dependence; zero if there is none.
+    /// Temperature dependence; zero if there is none.
     pub thermal: PerSensor<ThermalCoefficients>,
     /// Deviation in each recording from the common parameters; zero for recordings beyond the end of the
     /// list.

@@ -32,7 +32,7 @@ const USUAL_VARIATION: f64 = 3.0;
 /// The estimated quantities with their prior uncertainty.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Model {
-    /// Form of the installation matrix.
+    /// Form of the misalignment matrix.
     pub form: InstallationForm,
     /// Observations at rest.
     pub aiding: Aiding,

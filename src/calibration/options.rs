@@ -18,7 +18,7 @@ use crate::run::Aiding;
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Options {
-    /// Form of the installation matrix.
+    /// Form of the misalignment matrix.
     pub form: InstallationForm,
     /// Observations at rest; `None`: table attitude if there is a table log, otherwise zero velocity.
     pub aiding: Option<Aiding>,
@@ -49,7 +49,7 @@ impl Default for Options {
 }
 
 impl Options {
-    /// Sets the installation form.
+    /// Sets the misalignment form.
     pub fn installation(self, form: InstallationForm) -> Self {
         Self { form, ..self }
     }

@@ -68,7 +68,7 @@ pub struct Outcome {
     pub innovations: Vec<Innovation>,
     /// Consistency of the innovations with their covariance in the last pass.
     pub consistency: Consistency,
-    /// Whether the data reject the installation form; `None` if they cannot test it.
+    /// Whether the data reject the misalignment form; `None` if they cannot test it.
     pub form_test: Option<FormTest>,
     /// The estimated model, with the noise that was used.
     pub model: Model,

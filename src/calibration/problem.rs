@@ -108,7 +108,7 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The same with another model.
+    /// A copy with another model.
     pub fn with_model(&self, model: Model) -> Self {
         Self {
             model,
@@ -116,7 +116,7 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The same with a modified model.
+    /// A copy with a modified model.
     pub fn with(&self, change: impl FnOnce(&mut Model)) -> Self {
         let mut changed = self.clone();
         change(&mut changed.model);

@@ -93,7 +93,7 @@ impl AxisOrder {
         inverse
     }
 
-    /// The same with every axis reversed.
+    /// A copy with every axis reversed.
     pub fn opposite(&self) -> Self {
         Self {
             reversed: self.reversed.map(|reversed| !reversed),

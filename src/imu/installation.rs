@@ -1,12 +1,12 @@
-//! The installation matrix `C` and its forms.
+//! The misalignment matrix `C` and its forms.
 
 use nalgebra::{Matrix3, SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
-/// Largest number of installation angles of any form; a form with fewer leaves the last ones zero.
+/// Largest number of misalignment angles of any form; a form with fewer leaves the last ones zero.
 pub const ANGLES: usize = 6;
 
-/// Definition of the installation matrix by six or three small angles.
+/// Definition of the misalignment matrix by six or three small angles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum InstallationForm {
@@ -66,7 +66,7 @@ impl InstallationForm {
         slope
     }
 
-    /// The installation matrix of these angles (pure numbers, direction cosines or radians).
+    /// The misalignment matrix of these angles (pure numbers, direction cosines or radians).
     pub fn matrix(self, angles: &SVector<f64, ANGLES>) -> Matrix3<f64> {
         let mut c = Matrix3::zeros();
         for angle in 0..self.angle_names().len() {
@@ -93,7 +93,7 @@ impl InstallationForm {
         d
     }
 
-    /// Splits a sensitivity matrix `A = K C` into scale factors and installation angles (design §4).
+    /// Splits a sensitivity matrix `A = K C` into scale factors and misalignment angles (design §4).
     ///
     /// General and six-angle reproduce `A` exactly. Three-angle takes `K_i = A_ii` and half the
     /// difference of the two entries of a pair; its error is half their sum. In every form, the sign of a

@@ -11,9 +11,9 @@ pub struct NoiseKeys {
     pub random_walk: (&'static str, f64),
     /// 1σ of a Gauss–Markov bias, and its unit in rad/s or m/s².
     pub gauss_markov: (&'static str, f64),
-    /// Its former name, which is still accepted; data sheets use it for the floor of the Allan deviation.
+    /// Former name, which is still accepted; data sheets use it for the floor of the Allan deviation.
     pub former: &'static str,
-    /// Its correlation time in s.
+    /// Correlation time in s.
     pub correlation_time: &'static str,
     /// Noise of moves by their rate or acceleration, in √s.
     pub by_motion: &'static str,

@@ -1,4 +1,4 @@
-//! One triad: scale factors, installation, biases, and their prior.
+//! One triad: scale factors, misalignments, biases, and their prior.
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
@@ -17,11 +17,11 @@ pub type TriadVector = SVector<f64, PARAMETERS>;
 /// The model `N = K C u + D` of one triad, with `N` divided by the nominal scale of its axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Triad {
-    /// Installation form: definition of `C` by the angles.
+    /// Misalignment form: definition of `C` by the angles.
     pub form: InstallationForm,
     /// Diagonal of `K`, relative to the nominal scale.
     pub scale: Vector3<f64>,
-    /// Installation angles, pure numbers; those that the form does not have are zero.
+    /// Misalignment angles, pure numbers; those that the form does not have are zero.
     pub angles: SVector<f64, ANGLES>,
     /// `D` in rad/s or m/s².
     pub bias: Vector3<f64>,
@@ -54,7 +54,7 @@ impl Triad {
         Self::from_sensitivity(form, &self.sensitivity(), self.bias)
     }
 
-    /// The installation matrix `C`.
+    /// The misalignment matrix `C`.
     pub fn installation(&self) -> Matrix3<f64> {
         self.form.matrix(&self.angles)
     }
@@ -108,7 +108,7 @@ impl Triad {
         }
     }
 
-    /// Indices of the installation angles above the diagonal of `C`. In the accelerometer body frame, those of the
+    /// Indices of the misalignment angles above the diagonal of `C`. In the accelerometer body frame, those of the
     /// accelerometers are zero.
     pub fn above_the_diagonal(form: InstallationForm) -> impl Iterator<Item = usize> {
         let angles = form.angle_names().iter().enumerate();
@@ -117,7 +117,7 @@ impl Triad {
             .map(|(angle, _)| INSTALLATION + angle)
     }
 
-    /// The same without installation angles above the diagonal of `C`.
+    /// The same without misalignment angles above the diagonal of `C`.
     pub fn along_body_axes(&self) -> Self {
         let mut v = self.to_vector();
         for angle in Self::above_the_diagonal(self.form) {
@@ -175,7 +175,7 @@ impl Triad {
 pub enum ParameterKind {
     /// Scale factor, relative.
     Scale,
-    /// Installation angle, radians.
+    /// Misalignment angle, radians.
     Installation,
     /// Bias, rad/s or m/s².
     Bias,
@@ -191,7 +191,7 @@ impl ParameterKind {
 pub struct Prior {
     /// 1σ of each scale factor, relative; its mean is the nominal scale.
     pub scale_sigma: Vector3<f64>,
-    /// 1σ of every installation angle of each row, radians; the mean is zero.
+    /// 1σ of every misalignment angle of each row, radians; the mean is zero.
     pub installation_sigma: Vector3<f64>,
     /// Mean of the biases, rad/s or m/s².
     pub bias: Vector3<f64>,

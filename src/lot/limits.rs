@@ -104,7 +104,7 @@ pub fn overall(checks: &[Check]) -> Verdict {
 }
 
 impl Verdict {
-    /// Its name.
+    /// Name.
     pub fn name(self) -> &'static str {
         match self {
             Self::Pass => "pass",

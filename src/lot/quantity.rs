@@ -43,7 +43,7 @@ impl Quantity {
         }
     }
 
-    /// Its name in files, such as `gyro.scale.x` or `gyro.noise.x`.
+    /// Name in files, such as `gyro.scale.x` or `gyro.noise.x`.
     pub fn name(self) -> String {
         match self {
             Self::Parameter(index) => {

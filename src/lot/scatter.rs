@@ -47,7 +47,7 @@ pub struct Spread {
 pub struct Scatter {
     /// Mean, weighted by spread and own σ.
     pub mean: f64,
-    /// Its 1σ.
+    /// 1σ.
     pub mean_sigma: f64,
     /// Sample standard deviation, the units' σ included.
     pub deviation: f64,

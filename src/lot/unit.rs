@@ -13,11 +13,11 @@ use crate::noise::RestNoise;
 /// A unit with its calibration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Unit {
-    /// Its name, unique among the units.
+    /// Name, unique among the units.
     pub name: String,
     /// `[meta]` of its run, if that could be read.
     pub meta: BTreeMap<String, String>,
-    /// Its calibration, or the reason for failure.
+    /// Calibration, or the reason for failure.
     pub calibrated: Result<Calibrated, String>,
 }
 
@@ -67,13 +67,13 @@ impl Calibrated {
 pub struct Row {
     /// The unit.
     pub unit: Unit,
-    /// Its calibration in the common form, or the reason why it cannot be used.
+    /// Calibration in the common form, or the reason why it cannot be used.
     pub canonical: Result<Canonical, String>,
-    /// Its noise at rest, by the common nominal scales; `None` if it is not known.
+    /// Noise at rest, by the common nominal scales; `None` if it is not known.
     pub noise: Option<RestNoise>,
     /// Consistency of its difference from the truth with its covariance; `None` without truth or correlations.
     pub nees: Option<Nees>,
-    /// Its checks against the limits.
+    /// Checks against the limits.
     pub checks: Vec<Check>,
     /// Combined verdict of all checks; `None` without a specification.
     pub verdict: Option<Verdict>,

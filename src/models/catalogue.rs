@@ -5,9 +5,9 @@ use super::Room;
 /// An embedded model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Embedded {
-    /// Its folder.
+    /// Folder.
     pub room: Room,
-    /// Its name on the command line and in other models.
+    /// Name on the command line and in other models.
     pub name: &'static str,
     text: &'static str,
 }
@@ -21,7 +21,7 @@ impl Embedded {
         })
     }
 
-    /// Its description: the first sentence of the initial comment of its file.
+    /// Description: the first sentence of the initial comment of its file.
     pub fn description(&self) -> String {
         let comment = self.text.lines().map_while(|line| line.strip_prefix('#'));
         let words: Vec<&str> = comment

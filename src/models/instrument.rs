@@ -18,7 +18,7 @@ use turncal_input::{Finite, NonNegative, Positive};
 /// A grade of instrument.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Instrument {
-    /// Its name.
+    /// Name.
     pub name: String,
     /// Size of one pulse, rad and m/s.
     pub pulse: PerSensor<f64>,
@@ -48,7 +48,7 @@ pub struct Variation {
 /// 1σ tolerances of an instrument before calibration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tolerances {
-    /// Its kind.
+    /// Kind.
     pub of: String,
     /// Scale factor, relative.
     pub scale: PerSensor<f64>,
@@ -72,12 +72,12 @@ enum Shape {
 }
 
 impl Spread {
-    /// Its mean.
+    /// Mean.
     pub fn mean(&self) -> f64 {
         self.mean
     }
 
-    /// Its standard deviation; a uniform ±a has a/√3.
+    /// Standard deviation; a uniform ±a has a/√3.
     pub fn sigma(&self) -> f64 {
         match self.shape {
             Shape::Uniform(half_width) => half_width / 3f64.sqrt(),
@@ -101,7 +101,7 @@ impl Spread {
     }
 }
 
-/// An installation form with the distribution of its angles.
+/// A misalignment form with the distribution of its angles.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct InstallationModel {
     /// The form.

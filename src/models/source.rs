@@ -13,7 +13,7 @@ use turncal_input::{Document, FileError, Place as At};
 pub enum Room {
     /// Instruments: noise, pulses, and tolerances before calibration.
     Imu,
-    /// Installation forms and sizes of their angles.
+    /// Misalignment forms and sizes of their angles.
     Installation,
     /// Turntables.
     Turntable,

@@ -15,7 +15,7 @@ use crate::imu::{PerSensor, Sensed, Sensor, Term, TermVector, ThermalState};
 /// Integrals over a short stretch of samples.
 ///
 /// The output of a triad is linear in `b = [u; 1]` (see [`crate::imu::Triad::response`]), so the integrals of
-/// `C_b_n b_k` ([`INPUTS`]) hold the derivative with respect to every parameter of any installation form.
+/// `C_b_n b_k` ([`INPUTS`]) hold the derivative with respect to every parameter of any misalignment form.
 #[derive(Debug, Clone, Default)]
 struct Part {
     /// ∫C_b_n b_k dt with the gyro input in b.

@@ -129,7 +129,7 @@ impl<'a> Navigator<'a> {
         })
     }
 
-    /// The same with these enabled error-term parameters, and values of all parameters (zero if off).
+    /// A copy with these enabled error-term parameters, and values of all parameters (zero if off).
     pub fn with_terms(mut self, on: Vec<usize>, values: TermVector) -> Self {
         self.on = on;
         self.shifted = values != TermVector::zeros();

@@ -16,9 +16,9 @@ const FEWEST: usize = 256;
 /// A stretch of samples.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stretch {
-    /// Its samples.
+    /// Samples.
     pub samples: Range<usize>,
-    /// Its name, such as `the whole recording`.
+    /// Name, such as `the whole recording`.
     pub name: String,
     /// Whether the instrument is at rest during it, according to its own output.
     pub stands: bool,
@@ -49,7 +49,7 @@ pub enum StretchError {
     TooShort {
         /// Name of the stretch.
         name: String,
-        /// Its number of samples.
+        /// Number of samples.
         found: usize,
     },
 }

@@ -58,11 +58,11 @@ struct Quantity {
 /// A unit of a quantity, and its users.
 #[derive(Debug, PartialEq, Serialize)]
 pub struct Convention {
-    /// Its symbol.
+    /// Symbol.
     pub unit: &'static str,
     #[serde(skip)]
     scale: Scale,
-    /// Its name and users. Program keys in backticks are also accepted as unit names.
+    /// Name and users. Program keys in backticks are also accepted as unit names.
     pub meaning: &'static str,
     /// Other spellings of the unit, normalised.
     #[serde(skip)]

@@ -13,7 +13,7 @@ pub const MANY: f64 = 1e4;
 pub struct Found {
     /// The process.
     pub process: Process,
-    /// Its strength, see [`Process`].
+    /// Strength, see [`Process`].
     pub strength: f64,
     /// 1σ of the strength.
     pub sigma: f64,
@@ -22,7 +22,7 @@ pub struct Found {
 }
 
 impl Found {
-    /// Its own Allan variance at a cluster time.
+    /// Own Allan variance at a cluster time.
     pub fn allan_variance(&self, tau: f64) -> f64 {
         self.strength.powi(2) * self.process.allan_variance(tau)
     }

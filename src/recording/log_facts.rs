@@ -89,7 +89,7 @@ impl NamedColumns {
 /// One column of samples.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct ColumnFacts {
-    /// Its name in the file.
+    /// Name in the file.
     pub name: String,
     /// The smallest value …
     pub smallest: f64,

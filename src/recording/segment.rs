@@ -14,7 +14,7 @@ pub struct Segment {
     pub start: f64,
     /// The first stamp after its last row, s.
     pub end: f64,
-    /// Its samples, at least one.
+    /// Samples, at least one.
     pub samples: Range<usize>,
     /// `x_up` … `z_down`, `rot_x+360` and the like, or any other text.
     pub label: String,

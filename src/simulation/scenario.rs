@@ -32,9 +32,9 @@ pub struct Scenario {
     pub site: Site,
     /// The grade of instrument.
     pub instrument: Instrument,
-    /// Its installation.
+    /// Installation.
     pub installation: InstallationModel,
-    /// The true body frame: in the accelerometer frame, the installation angles that it
+    /// The true body frame: in the accelerometer frame, the misalignment angles that it
     /// fixes are not drawn.
     pub body_frame: BodyFrame,
     /// True values that are given instead of drawn.
@@ -66,7 +66,7 @@ pub struct Scenario {
 pub struct Given {
     /// Scale factors − 1.
     pub scale: Option<Vector3<f64>>,
-    /// Installation angles, rad.
+    /// Misalignment angles, rad.
     pub angles: Option<SVector<f64, ANGLES>>,
     /// Biases, rad/s or m/s².
     pub bias: Option<Vector3<f64>>,

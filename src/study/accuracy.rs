@@ -114,7 +114,7 @@ impl Accuracy {
         filtered(&self.trials)
     }
 
-    /// The filter's installation form and that of the truth.
+    /// The filter's misalignment form and that of the truth.
     pub fn forms(&self) -> (InstallationForm, InstallationForm) {
         (self.study.form, self.study.scenario.installation.form)
     }
@@ -135,7 +135,7 @@ impl Accuracy {
             .filter_map(|trial| Some((trial.run, trial.failure.as_deref()?)))
     }
 
-    /// Number of runs whose data reject the filter's installation form, and number of runs tested.
+    /// Number of runs whose data reject the filter's misalignment form, and number of runs tested.
     pub fn rejections(&self) -> (usize, usize) {
         let tests = || self.filtered().filter_map(|filtered| filtered.form_test);
         let rejected = tests().filter(|test| test.rejects());

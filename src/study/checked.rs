@@ -11,7 +11,7 @@ use crate::survey::{Expected, Path};
 pub struct CheckedCalibration {
     /// The solution.
     pub solution: Solution,
-    /// Its checks.
+    /// Checks.
     pub assessment: Assessment,
     /// The calibration to write.
     pub calibration: Calibration,

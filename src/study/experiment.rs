@@ -104,7 +104,7 @@ pub struct Worth {
     pub largest: Spread,
     /// At the end, due to the errors of one triad alone.
     pub by_one: PerSensor<Spread>,
-    /// Final median of the closed form in the same installation form divided by that of this method; `None` for the
+    /// Final median of the closed form in the same misalignment form divided by that of this method; `None` for the
     /// closed form.
     pub gain: Option<Ratio>,
     /// Budget of the final error from the stated covariance.

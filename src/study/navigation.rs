@@ -82,7 +82,7 @@ pub struct Mission {
     pub interval: f64,
 }
 
-/// A calibration and the truth, in one body frame and one installation form.
+/// A calibration and the truth, in one body frame and one misalignment form.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pair {
     /// The true triads.
@@ -142,7 +142,7 @@ impl Pair {
         Ok((pair, calibration.body_frame))
     }
 
-    /// The same with the errors of one triad only; the other is calibrated perfectly.
+    /// A copy with the errors of one triad only; the other is calibrated perfectly.
     pub fn with_errors_of(mut self, only: Sensor) -> Self {
         for sensor in Sensor::ALL.into_iter().filter(|&sensor| sensor != only) {
             *self.calibration.get_mut(sensor) = *self.truth.get(sensor);

@@ -1,7 +1,7 @@
-//! The paper's Table 1: errors of 40 h of navigation due to the two simplified installation forms (Zhao,
+//! The paper's Table 1: errors of 40 h of navigation due to the two simplified misalignment forms (Zhao,
 //! Jiang, Li 2016, §3.2).
 //!
-//! For each sample, installation angles are drawn (six independent ones for each triad, rows of unit norm), and the
+//! For each sample, misalignment angles are drawn (six independent ones for each triad, rows of unit norm), and the
 //! triad is calibrated by the closed form from six positions without noise. Navigation at rest uses the remaining
 //! errors, level, with perfect alignment and fixed height, for gyros and accelerometers separately. The figure of a
 //! sample is the largest absolute error of the run.
@@ -68,7 +68,7 @@ pub enum Table1Error {
     Samples(usize),
     /// A sample's positions leave its calibration undetermined.
     #[error(
-        "sample {0} cannot be calibrated from six positions: its installation angles are too large"
+        "sample {0} cannot be calibrated from six positions: its misalignment angles are too large"
     )]
     Degenerate(usize),
 }

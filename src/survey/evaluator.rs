@@ -40,9 +40,9 @@ pub struct Status {
 pub struct InterimCalibration {
     /// Duration of the record at that time, s.
     pub duration: f64,
-    /// Its verdict.
+    /// Verdict.
     pub verdict: Verdict,
-    /// Its findings.
+    /// Findings.
     pub findings: Vec<Finding>,
     /// Whether a specification is given and its σ decide every limit.
     pub is_met: bool,

@@ -75,7 +75,7 @@ impl Path {
 /// RMS σ of each group's estimated parameters, rad/s or m/s² normalised; `None` if all are fixed.
 pub type GroupSigma = Vec<(Group, Option<f64>)>;
 
-/// Predicted σ, in the general installation form.
+/// Predicted σ, in the general misalignment form.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Expected {
     /// RMS σ of the estimated parameters of each group, rad/s or m/s² normalised; `None` if all are fixed.

@@ -11,7 +11,7 @@ const SINE: usize = 1;
 /// A rotation axis of a table.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Axis {
-    /// Its name, such as `outer`.
+    /// Name, such as `outer`.
     pub name: String,
     /// Unit vector in the frame of the next axis outwards; that of the outermost in East-North-Up.
     pub direction: Vector3<f64>,

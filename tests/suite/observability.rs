@@ -48,8 +48,8 @@ fn turns_about_one_axis_say_in_words_what_they_did_not_observe() {
     assert_eq!(outcome.observability.unobserved().count(), UNOBSERVED.len());
     assert!(says(
         &outcome,
-        "gyro scale x, y; gyro installation xy, yx, zx, zy; accel scale x, y; \
-         accel installation xy, yx, zx, zy; accel bias x, y, z"
+        "gyro scale x, y; gyro misalignment xy, yx, zx, zy; accel scale x, y; \
+         accel misalignment xy, yx, zx, zy; accel bias x, y, z"
     ));
 }
 

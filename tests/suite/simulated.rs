@@ -243,7 +243,7 @@ fn a_form_that_the_instrument_does_not_have_is_betrayed_by_its_innovations() {
     assert!(outcome.form_test.is_some_and(|test| test.rejects()));
     for sentence in [
         "The filter is inconsistent",
-        "The three-angle installation form does not fit the data",
+        "The three-angle misalignment form does not fit the data",
     ] {
         assert!(says(&outcome, sentence));
     }

@@ -40,10 +40,9 @@ impl PathCommand {
 
 /// Predicts σ, the value of each move, and errors that a path cannot reveal
 ///
-/// The path is a TOML file or an embedded name, or words for a sensor turned by hand: x_up … z_down, and turns such
-/// as "turn x 90", separated by commas. For a run.toml, σ are those expected from its own recording. The prediction
-/// is the Cramér–Rao bound for the stated noise. With a specification, the exit status is 3 if σ are too large to
-/// decide a limit.
+/// The path is a TOML file, an embedded name, or a list of moves by hand, separated by commas: x_up … z_down, and turns
+/// such as "turn x 90". With a run.toml, turncal predicts the σ of its own recording. The prediction is the Cramér–Rao
+/// bound for the stated noise. With a specification, the exit status is 3 if σ are too large to decide a limit.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal path evaluate three-axis
@@ -51,7 +50,7 @@ impl PathCommand {
   turncal path evaluate z_up,x_up,x_down,y_up,y_down --imu bmi088
   turncal path evaluate my-run/run.toml")]
 pub struct Evaluate {
-    /// Path: a TOML file, an embedded name, words for turns by hand, or a run.toml
+    /// Path: a TOML file, an embedded name, a list of moves such as "z_up, turn x 90", or a run.toml
     path: String,
     /// Scenario with site, rate, instrument and table [default: demo; by hand: mems]
     #[arg(long, value_name = "SCENARIO")]
@@ -69,7 +68,7 @@ pub struct Evaluate {
     /// K, E, D alone; or terms to estimate whatever the data say [default: auto]
     #[arg(long, value_name = "TERM", value_parser = with_value(), value_delimiter = ',')]
     with: Vec<With>,
-    /// Limits that the calibration must decide (a specification.toml)
+    /// Specification: tests whether the predicted σ are small enough to decide pass or fail
     #[arg(long, value_name = "FILE")]
     specification: Option<PathBuf>,
     #[command(flatten)]

@@ -93,9 +93,9 @@ impl Simulate {
         directory.commit()?;
         drop(activity);
         tell!(
-            "{}: {} recording(s) written to {}",
+            "{}: {} written to {}",
             campaign.name,
-            simulated.len(),
+            turncal_input::counted(simulated.len(), "recording"),
             self.output.display()
         );
         Ok(())

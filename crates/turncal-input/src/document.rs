@@ -57,7 +57,7 @@ const KINDS: [(&str, &str); 4] = [
 pub struct Document<'a> {
     /// The file, as errors name it.
     pub file: &'a Path,
-    /// Its text.
+    /// Text.
     pub text: &'a str,
 }
 

@@ -73,7 +73,7 @@ pub enum Place {
     Byte(u64),
     /// A sample of a stream of such a file.
     Sample {
-        /// Its number, from one.
+        /// Number, from one.
         number: u64,
         /// The stream.
         stream: String,
@@ -149,6 +149,15 @@ impl FileError {
         Self::new(file, Place::File, found, expected, advice)
     }
 
+    /// An error for a quantity that a file does not show: `… is unknown: reason. Remedy.`
+    pub fn unknown(file: &Path, what: &str, why: &str, advice: &str) -> Self {
+        Self {
+            file: file.to_owned(),
+            place: Place::File,
+            message: format!("{what} is unknown: {why}. {advice}"),
+        }
+    }
+
     /// The system refused to write a file.
     pub fn unwritten(file: &Path, error: &std::io::Error) -> Self {
         let advice = "Free some disk space or choose another location.";
@@ -163,6 +172,12 @@ impl FileError {
             message: format!("cannot {doing}: {error}. {advice}"),
         }
     }
+}
+
+/// Such as `1 row` or `3 rows`.
+pub fn counted(count: usize, name: &str) -> String {
+    let plural = if count == 1 { "" } else { "s" };
+    format!("{count} {name}{plural}")
 }
 
 /// The candidate most similar to a misspelt name, if any.

@@ -17,6 +17,6 @@ pub use checked::{
     NonNegative, OneOrThree, Positive, stated_gravity_sigma,
 };
 pub use document::Document;
-pub use error::{FileError, Place, choice, excerpt, list, nearest, suggestion};
+pub use error::{FileError, Place, choice, counted, excerpt, list, nearest, suggestion};
 pub use names::FileColumn;
 pub use sensor::{PerSensor, Sensor};

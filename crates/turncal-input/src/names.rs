@@ -5,7 +5,7 @@ use super::error::{choice, excerpt, nearest};
 /// A column as `run.toml` names it.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct FileColumn {
-    /// Its name in the file; empty if the triad was not recorded.
+    /// Name in the file; empty if the triad was not recorded.
     pub name: String,
     /// Whether its values are read with the sign reversed.
     pub reversed: bool,

@@ -22,7 +22,7 @@ pub enum TimeUnit {
 }
 
 impl TimeUnit {
-    /// Its names in `run.toml`.
+    /// Names in `run.toml`.
     pub const WORDS: [(&'static str, Self); 5] = [
         ("s", Self::PerSecond(1.0)),
         ("ms", Self::PerSecond(1e3)),

@@ -44,7 +44,7 @@ pub struct CsvFile {
 /// Uncertainty at the end of a file without a line ending.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Cut {
-    /// Its last row lacks fields.
+    /// Last row lacks fields.
     Row,
     /// The last number of its last row may lack digits.
     Number,

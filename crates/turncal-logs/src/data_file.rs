@@ -93,7 +93,7 @@ impl DataFile {
         let nearest = nearest(&name.unwrap_or_default(), names);
         let asked = nearest.map_or_else(String::new, |name| format!("Did you mean `{name}`? "));
         let advice = format!(
-            "{asked}Names in run.toml are relative to run.toml; correct the name or add the file."
+            "{asked}Correct the name or add the file; names in run.toml are relative to run.toml."
         );
         FileError::io(self, "open the file", error, &advice)
     }

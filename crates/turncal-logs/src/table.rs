@@ -43,7 +43,7 @@ impl Table {
         })
     }
 
-    /// Its name.
+    /// Name.
     pub fn name(&self) -> &Path {
         &self.name
     }

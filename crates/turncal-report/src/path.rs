@@ -28,7 +28,7 @@ pub struct Report<'a> {
     pub with: &'a str,
     /// Each move in words.
     pub moves: &'a [String],
-    /// Its expected results.
+    /// Expected results.
     pub evaluation: &'a Evaluation,
     /// Limits of the specification that the calibration is to decide, if any.
     pub checks: Option<&'a [Check]>,
@@ -59,7 +59,8 @@ impl Report<'_> {
             self.name
         ));
         document.lead = vec![format!(
-            "{}. σ are the Cramér–Rao bound for a recording of this path with the stated noise; no data were measured.",
+            "{}. The σ are Cramér–Rao bounds for a recording of this path with the stated noise; no data were \
+             measured.",
             self.with
         )];
         document.both(self.groups());
@@ -91,7 +92,8 @@ impl Report<'_> {
             (None, _, unobserved) => (
                 Word::UseWithCare,
                 format!(
-                    "{unobserved} combination(s) of parameters keep more than half of their prior σ"
+                    "σ of {} of parameters is still more than half of the prior",
+                    several(unobserved, "combination")
                 ),
             ),
         };
@@ -159,7 +161,8 @@ impl Report<'_> {
         let columns = columns.chain(Group::all().map(Group::short));
         let mut table = Table::new("σ without each move, divided by σ with all moves", columns)
             .section(self.evaluation.without.iter().enumerate().map(row))
-            .note("A path without the move also lacks the dwell after it. Evaluate that path before you use it.");
+            .note("A path without the move also lacks the dwell after it. Evaluate the shorter path before you use \
+                it.");
         table.optional = vec![2];
         table
     }

@@ -49,14 +49,14 @@ pub struct Budget {
 pub struct BudgetPart {
     /// The source.
     pub source: BudgetSource,
-    /// Its part of the covariance of the parameters of both triads, in their units.
+    /// Part of the covariance of the parameters of both triads, in their units.
     pub covariance: ParameterMatrix,
     /// Degrees of freedom with which its variance is known (JCGM 100, G.4.2); infinite if it is stated.
     pub degrees_of_freedom: f64,
 }
 
 impl BudgetPart {
-    /// Its part of the variance of a parameter; a difference may be below zero by rounding.
+    /// Part of the variance of a parameter; a difference may be below zero by rounding.
     fn variance(&self, parameter: usize) -> f64 {
         self.covariance[(parameter, parameter)].max(0.0)
     }

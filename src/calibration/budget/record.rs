@@ -18,11 +18,11 @@ pub struct BudgetRecord {
 /// Contribution of one source.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BudgetPartRecord {
-    /// Its name, such as `table position`.
+    /// Name, such as `table position`.
     pub source: String,
     /// Standard uncertainty of each parameter.
     pub u: Vec<f64>,
-    /// Its degrees of freedom; `None` if infinite.
+    /// Degrees of freedom; `None` if infinite.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub degrees_of_freedom: Option<f64>,
 }

@@ -53,7 +53,7 @@ pub enum BudgetSource {
     Recording,
     /// Parameters of an error term.
     Term(Term),
-    /// Second-order effects of the installation form in poorly known angles.
+    /// Second-order effects of the misalignment form in poorly known angles.
     Curvature,
     /// Headings not determined by Earth rate.
     Headings,
@@ -74,7 +74,7 @@ impl BudgetSource {
         }
     }
 
-    /// Its name for reports.
+    /// Name for reports.
     pub fn name(self) -> String {
         let name = match self {
             Self::White(sensor) => return format!("{} white noise", sensor.name()),

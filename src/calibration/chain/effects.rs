@@ -44,7 +44,7 @@ impl Effect {
         }
     }
 
-    /// Its source in the uncertainty budget.
+    /// Source in the uncertainty budget.
     pub fn in_budget(self) -> BudgetSource {
         match self {
             Self::Noise(source) => source.in_budget(),
@@ -63,13 +63,13 @@ pub struct Sizes {
 }
 
 impl Sizes {
-    /// The same with another variance of an effect.
+    /// A copy with another variance of an effect.
     pub fn with(mut self, effect: Effect, factor: f64) -> Self {
         self.effects.insert(effect, factor);
         self
     }
 
-    /// The same with another variance of an event.
+    /// A copy with another variance of an event.
     pub fn with_event(mut self, effect: Effect, event: usize, factor: f64) -> Self {
         self.events.insert((effect, event), factor);
         self
@@ -91,7 +91,7 @@ impl Sizes {
         self.events.iter().map(|(&event, &factor)| (event, factor))
     }
 
-    /// The same with every effect as the links were made.
+    /// A copy with every effect as the links were made.
     pub fn of_events_alone(&self) -> Self {
         Self {
             effects: BTreeMap::new(),

@@ -39,7 +39,7 @@ pub struct Part {
 }
 
 impl Part {
-    /// The same with the variances of all its noise multiplied by a factor.
+    /// A copy with the variances of all its noise multiplied by a factor.
     pub fn dispersed(mut self, factor: f64) -> Self {
         let root = factor.sqrt();
         self.measured /= root;
@@ -53,7 +53,7 @@ impl Part {
 
 /// An observation, whitened by its covariance given `g`.
 pub struct Whitened<'a> {
-    /// Its number among those of the part.
+    /// Number among those of the part.
     pub number: usize,
     /// Three scalars of σ 1, given `g = 0` …
     pub scalars: Vector3<f64>,

@@ -11,6 +11,7 @@ use crate::calibration::chain::{Effect, Slip};
 use crate::calibration::sizes::{FREEDOM, Weighed};
 use crate::calibration::{Finding, FindingKind as Kind, Problem, Source};
 use crate::imu::Sensor;
+use crate::number::three_digits;
 use crate::statistics::FALSE_ALARM;
 use crate::units::{ARCSEC, DEG_PER_H, MICRO_G};
 
@@ -32,13 +33,13 @@ pub enum EventKind {
 /// An event beyond what its effect, with its heavy tails, makes by chance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Event {
-    /// Its kind.
+    /// Kind.
     pub kind: EventKind,
     /// Number of the dwell that it concerns or precedes, from zero.
     pub dwell: usize,
     /// End of the first part of that dwell, s.
     pub time: f64,
-    /// Its size, in rad, m/s, rad/s or m/s².
+    /// Size, in rad, m/s, rad/s or m/s².
     pub size: f64,
     /// −2 ln of the p-value, and its limit.
     pub significance: f64,
@@ -102,7 +103,8 @@ impl Event {
         } = self;
         let number = dwell + 1;
         let (kind, text) = self.kind.words(number, *time, self.size);
-        let text = format!("{text} (significance {significance:.0}; limit {limit:.0}).");
+        let shown = three_digits(*significance);
+        let text = format!("{text} (significance {shown}; limit {limit:.0}).");
         let figures = json!({
             "dwell": number, "time_s": time, "size": self.size,
             "significance": significance, "limit": limit
@@ -181,8 +183,8 @@ impl EventKind {
             Self::Position => (
                 Kind::PositionWrong,
                 format!(
-                    "The table readings in dwell {number} are wrong by {angle} (at {time:.1} s). They have next to no \
-                     weight. Check the log there for a bump or a wrong reading"
+                    "The table readings in dwell {number} are wrong by {angle} (at {time:.1} s). turncal gave them \
+                     next to no weight. Check the table log there for a bump or a wrong reading"
                 ),
             ),
             Self::Move => (
@@ -196,8 +198,8 @@ impl EventKind {
                 Kind::VelocityWrong,
                 format!(
                     "In the move before dwell {number} (at {time:.1} s) the accelerometers missed a velocity of \
-                     {size:.2e} m/s. turncal estimated it. Check the log there for lost samples, an exceeded range or a \
-                     bump"
+                     {size:.2e} m/s. turncal estimated this velocity. Check the log there for lost samples, an \
+                     exceeded range or a bump"
                 ),
             ),
             Self::BiasStep(sensor) => {
@@ -210,8 +212,8 @@ impl EventKind {
                     Kind::BiasStep,
                     format!(
                         "Before dwell {number} (at {time:.1} s) the {sensor} biases changed by about {size:.2} {name}. \
-                         The biases are the mean over the recording. Check the log there for a shock or a jump of \
-                         temperature or supply"
+                         The calibration contains the mean bias over the recording. Check the log there for a shock or \
+                         a jump of temperature or supply"
                     ),
                 )
             }
@@ -223,8 +225,9 @@ impl EventKind {
                 (
                     Kind::Slipped,
                     format!(
-                        "Before dwell {number} (at {time:.1} s) {what} by {angle}. turncal estimated this angle; \
-                         misalignments are those to the table as it stood before. Fasten it, and repeat the recording"
+                        "Before dwell {number} (at {time:.1} s) {what} by {angle}. turncal estimated this angle; the \
+                         misalignments refer to the mounting before that. Fasten the instrument and the table, and \
+                         repeat the recording"
                     ),
                 )
             }

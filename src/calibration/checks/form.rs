@@ -1,4 +1,4 @@
-//! Test of the installation form by the data.
+//! Test of the misalignment form by the data.
 
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -10,7 +10,7 @@ use crate::calibration::{
 use crate::imu::InstallationForm;
 use crate::statistics::{FALSE_ALARM, chi_square_limit};
 
-/// The likelihood ratio of a restricted installation form against the general one.
+/// The likelihood ratio of a restricted misalignment form against the general one.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct FormTest {
     /// Decrease of the cost, −2 ln of likelihood and prior, if the general form is allowed.
@@ -35,7 +35,7 @@ impl FormTest {
             limit,
         } = self;
         let text = format!(
-            "The {} installation form does not fit the data: the {angles} additional angles of the general form are \
+            "The {} misalignment form does not fit the data: the {angles} additional angles of the general form are \
              needed (χ² falls by {gain:.0}; limit {limit:.1}). Rerun with --installation general.",
             form.name()
         );

@@ -24,7 +24,7 @@ impl Observation {
     /// All of them.
     pub const ALL: [Self; 3] = [Self::Velocity, Self::Table, Self::Attitude];
 
-    /// Its name.
+    /// Name.
     pub fn name(self) -> &'static str {
         match self {
             Self::Velocity => "velocity",

@@ -9,7 +9,7 @@ use crate::run::motion::LabelCheck;
 pub fn contradicted(contradicted: &[LabelCheck]) -> Option<Finding> {
     let each: Vec<String> = contradicted.iter().map(LabelCheck::to_string).collect();
     let text = format!(
-        "Labels and recording disagree. Section {}.",
+        "The labels contradict the recording. Section {}.",
         each.join("; section ")
     );
     let figure = |check: &LabelCheck| {
@@ -27,8 +27,8 @@ pub fn contradicted(contradicted: &[LabelCheck]) -> Option<Finding> {
 /// The finding on labelled sections with missing parts, if any.
 pub fn lost(labels: &[String]) -> Option<Finding> {
     let text = format!(
-        "Skipped because part of it is missing from the log: section {}. Record it again, or remove it from \
-         [segments].",
+        "Part of a labelled section is missing from the log, so turncal skipped section {}. Record the section again, \
+         or remove it from [segments].",
         labels.join(", ")
     );
     let figures = json!({ "labels": labels });

@@ -180,7 +180,7 @@ fn alike(one: &Vector3<f64>, other: &Vector3<f64>) -> bool {
     (one - other).norm() < ALIKE * other.norm()
 }
 
-/// Likely causes for the installation angles of triads with some angles far from their prior.
+/// Likely causes for the misalignment angles of triads with some angles far from their prior.
 fn of_installation(triads: &PerSensor<Triad>, far: PerSensor<bool>) -> Vec<Cause> {
     // To first order the antisymmetric half of installation is a rotation, the symmetric half a skew.
     let half = |sensor: Sensor, sign: f64| {

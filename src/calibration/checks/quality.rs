@@ -43,7 +43,7 @@ pub struct Quality {
 /// Residuals in one dwell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DwellResidual {
-    /// Its number, from 1.
+    /// Number, from 1.
     pub number: usize,
     /// Magnitude of the mean specific force minus gravity, m/s².
     pub gravity: f64,

@@ -85,9 +85,9 @@ fn of_triad<'a>(
         Sensor::Accel => "µg/√Hz",
     };
     let text = format!(
-        "{} noise at rest is {compared} the stated value: {} instead of {} {symbol} (tolerance −{:.1} % to +{:.1} %). The \
-         estimate uses 0.1 s averages, so vibration of the mount raises it too. Run turncal allan on a long static record \
-         to separate noise from vibration, and correct {figure}.",
+        "{} noise at rest is {compared} the stated value: {} instead of {} {symbol} (tolerance −{:.1} % to +{:.1} %). \
+         The estimate uses 0.1 s averages, so vibration of the mount raises it too. Run turncal allan on a long static \
+         recording to separate noise from vibration, and correct {figure}.",
         triad_name(sensor),
         three_digits(found),
         three_digits(stated),

@@ -18,8 +18,9 @@ pub fn settles(problem: &Problem, outcome: &Outcome) -> Option<Finding> {
     let is_larger = log > 0.0 && (log / sigma).powi(2) > chi_square_limit(1.0, FALSE_ALARM);
     let size = three_digits(found.used);
     let text = format!(
-        "After a stop, the table's attitude is off its reading by {size} {} (1σ), which fades. turncal estimated the size. \
-         Wait after each stop, or state settling_sigma_arcsec in [turntable].",
+        "After a stop, the attitude of the table differs from its reading by {size} {} (1σ), which fades within \
+         seconds. turncal estimated this angle, and σ include it. Wait longer after each stop, or state \
+         settling_sigma_arcsec in [turntable].",
         found.unit
     );
     let figures = json!({ "size": found.used * unit });

@@ -99,9 +99,9 @@ impl TermEvidence {
         }
         if self.shown {
             let text = format!(
-                "The data show an error that scale factors, misalignments and biases cannot explain: {name} (probability \
-                 above 99.9 %). turncal estimated it with them, as --with {name} does. Use the values only together \
-                 with this term."
+                "The data show an error that scale factors, misalignments and biases cannot explain: {name} \
+                 (probability above 99.9 %). turncal estimated this error too, as with --with {name}. Apply the \
+                 calibration with `turncal apply`; exports without this term leave its error in."
             );
             return Some(Finding::new(Kind::ErrorTermEstimated, text, figures));
         }
@@ -111,9 +111,9 @@ impl TermEvidence {
         }
         let (shown_by, group) = (term.shown_by(), group.title());
         let text = format!(
-            "This recording does not show {name}, which may be there: σ of {group} are {factor:.2} times what they \
-             would be without it. To show it, add {shown_by}; if the instrument does not have it, state [imu.terms] \
-             {name} = {{ sigma = 0 }}."
+            "This recording does not show the possible error {name}. σ of {group} are {factor:.2} times as large as \
+             without this term. Add {shown_by}; if the instrument does not have this error, state [imu.terms] {name} = \
+             {{ sigma = 0 }}."
         );
         Some(Finding::new(Kind::TermNotShown, text, figures))
     }

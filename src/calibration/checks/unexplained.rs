@@ -43,7 +43,7 @@ pub fn absurd(problem: &Problem, outcome: &Outcome) -> Option<Finding> {
     let residuals = outcome.residuals(problem).ok()?;
     let names = [
         "|f| − g is {} of gravity",
-        "the direction of gravity after a move is off by {} of a turn",
+        "the direction of gravity after a move is wrong by {} of a turn",
     ];
     let pairs = names.into_iter().zip(residuals.middle());
     let worst = pairs.filter_map(|(name, middle)| middle.map(|middle| (name, middle)));

@@ -45,7 +45,7 @@ impl Constant {
         }
     }
 
-    /// Its index among the auxiliary parameters, if it is one.
+    /// Index among the auxiliary parameters, if it is one.
     pub fn auxiliary(self) -> Option<usize> {
         match self {
             Self::Base(axis) => Some(axis),
@@ -93,7 +93,7 @@ impl Constant {
         }
     }
 
-    /// Its usual size as one of an error term.
+    /// Usual size as one of an error term.
     fn usual_size(self, term: ErrorTerm, model: &Model) -> f64 {
         match (term, self) {
             (ErrorTerm::Instrument(of), _) => of.usual_size(&model.noise),

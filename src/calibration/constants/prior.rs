@@ -41,7 +41,7 @@ impl Prior {
         }
     }
 
-    /// Its exact contribution to a covariance, by source: `P P₀⁻¹ P`; without those that may be absent.
+    /// Exact contribution to a covariance, by source: `P P₀⁻¹ P`; without those that may be absent.
     pub fn parts(&self, of: &Posterior) -> BTreeMap<BudgetSource, DMatrix<f64>> {
         let n = self.constants.len();
         let mut parts = BTreeMap::new();

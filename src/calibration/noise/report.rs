@@ -44,7 +44,7 @@ pub struct NoiseTest {
 pub struct SourceFigures {
     /// The source.
     pub source: Source,
-    /// Its name.
+    /// Name.
     pub name: String,
     /// Unit of the figures.
     pub unit: String,
@@ -53,7 +53,7 @@ pub struct SourceFigures {
     pub stated: Option<f64>,
     /// The value used.
     pub used: f64,
-    /// Its 95 % interval; `None` if it was not estimated.
+    /// 95 % interval; `None` if it was not estimated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub interval: Option<[f64; 2]>,
 }
@@ -171,8 +171,9 @@ fn noise_learnt(
     });
     let (words, lines): (Vec<_>, Vec<_>) = named.unzip();
     let text = format!(
-        "Noise is larger than stated: {} (squared distance {ratio:.0}; limit {limit:.0}). turncal used its own estimate, \
-         and σ include it. To state it for the next recording, copy into run.toml: {}.",
+        "Noise is larger than stated: {} (squared distance {ratio:.0}; limit {limit:.0}). turncal used its own \
+         estimate, and σ include it. To state this estimate for the next recording, copy into [imu.noise] of run.toml: \
+         {}.",
         words.join("; "),
         lines.join(", ")
     );

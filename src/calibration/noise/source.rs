@@ -25,7 +25,7 @@ macro_rules! sources {
             /// All sources.
             pub const ALL: [Self; [$($name),*].len()] = [$(Self::$variant),*];
 
-            /// Its name for reports.
+            /// Name for reports.
             pub fn name(self) -> &'static str {
                 match self { $(Self::$variant => $name,)* }
             }
@@ -35,7 +35,7 @@ macro_rules! sources {
                 match self { $(Self::$variant => ($unit, $value),)* }
             }
 
-            /// Its triad, or the triad whose random walk is its reference.
+            /// Triad, or the triad whose random walk is its reference.
             pub fn triad(self) -> Sensor {
                 match self { $(Self::$variant => Sensor::$triad,)* }
             }
@@ -45,7 +45,7 @@ macro_rules! sources {
                 match self { $(Self::$variant => ($table, $line),)* }
             }
 
-            /// Its source in the uncertainty budget.
+            /// Source in the uncertainty budget.
             pub fn in_budget(self) -> BudgetSource {
                 match self { $(Self::$variant => BudgetSource::$part $((Sensor::$of))?,)* }
             }
@@ -105,7 +105,7 @@ impl Source {
         !seen && self.sigma(problem) > 0.0
     }
 
-    /// Its σ as modelled in a problem, in SI units and radians; the floor of the standstill noise counts
+    /// σ as modelled in a problem, in SI units and radians; the floor of the standstill noise counts
     /// as zero.
     pub(in crate::calibration) fn sigma(self, problem: &Problem) -> f64 {
         let (model, sensor) = (&problem.model, self.triad());

@@ -10,7 +10,7 @@ const STEPS: usize = 40;
 /// One component.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Component {
-    /// Its number among all candidates.
+    /// Number among all candidates.
     pub place: usize,
     pub variance: f64,
     /// 1σ of the logarithm of the variance.
@@ -24,7 +24,7 @@ pub struct Slope {
     pub deviance: f64,
     /// Gradient of ln of the likelihood with respect to that variance.
     pub score: f64,
-    /// Its expected information.
+    /// Expected information.
     pub information: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Auxiliary constants, estimated in addition to scale factors, installation and biases: errors of the
+//! Auxiliary constants, estimated in addition to scale factors, misalignments and biases: errors of the
 //! table's geometry, then parameters of the instrument's error terms.
 
 use nalgebra::{DMatrix, SVector};

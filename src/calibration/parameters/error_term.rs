@@ -1,4 +1,4 @@
-//! Error terms, which may be estimated in addition to scale factors, installation and biases.
+//! Error terms, which may be estimated in addition to scale factors, misalignments and biases.
 
 use serde::{Deserialize, Serialize};
 
@@ -72,7 +72,7 @@ impl ErrorTerm {
         }
     }
 
-    /// Its number of states.
+    /// Number of states.
     pub fn states(self) -> usize {
         match self {
             Self::GaussMarkovBias => 6,

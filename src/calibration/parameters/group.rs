@@ -1,4 +1,4 @@
-//! The six groups of parameters in reports: scale factor, installation and bias of both triads.
+//! The six groups of parameters in reports: scale factor, misalignment and bias of both triads.
 
 use super::{PARAMETERS, parameter_name, sensor_and_parameter};
 use crate::calibration::{Estimate, ParameterVector};
@@ -15,7 +15,7 @@ pub struct Group {
 /// Notation for the figures of a group.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GroupEntry {
-    /// Its kind with the letter of the model.
+    /// Kind with the letter of the model.
     pub title: &'static str,
     /// Key in files, with the unit.
     pub key: &'static str,
@@ -75,7 +75,7 @@ impl Group {
         format!("{} {}", self.sensor().name(), self.entry().title)
     }
 
-    /// Its title with the unit.
+    /// Title with the unit.
     pub fn titled(self) -> String {
         format!("{}, {}", self.title(), self.unit())
     }
@@ -86,7 +86,7 @@ impl Group {
         format!("{} {letter}", self.sensor().name())
     }
 
-    /// Its key in documents, such as `gyro.scale_ppm`.
+    /// Key in documents, such as `gyro.scale_ppm`.
     pub fn key(self) -> String {
         format!("{}.{}", self.sensor().name(), self.entry().key)
     }

@@ -46,7 +46,7 @@ pub struct Calibration {
     /// The method of estimation; `None` for a truth.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub method: Option<Method>,
-    /// Form of the installation matrix.
+    /// Form of the misalignment matrix.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub installation_form: Option<InstallationForm>,
     /// Observations of the filter; `None` for a method without filter.
@@ -173,7 +173,7 @@ pub struct Provenance {
 /// A file that was read.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct InputFile {
-    /// Its name, as run.toml spells it.
+    /// Name, as run.toml spells it.
     pub name: String,
     /// SHA-256 in hexadecimal digits.
     pub sha256: String,
@@ -201,7 +201,7 @@ fn if_known<'de, T: DeserializeOwned, D: Deserializer<'de>>(
 /// An auxiliary constant.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TermRecord {
-    /// Its value, in SI.
+    /// Value, in SI.
     pub value: f64,
     /// 1σ; `None` for a truth.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -211,7 +211,7 @@ pub struct TermRecord {
 /// Gravity at the site of a calibration.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct GravityRecord {
-    /// Its magnitude.
+    /// Magnitude.
     pub m_s2: f64,
     /// 1σ, common to the scale factors of all three accelerometers.
     pub sigma_m_s2: f64,
@@ -267,7 +267,7 @@ pub struct NisRecord {
 /// Evidence for an error term.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BlockRecord {
-    /// Its name, such as `accel-second-order`.
+    /// Name, such as `accel-second-order`.
     pub block: String,
     /// Whether it was stated or asked for.
     pub on: bool,
@@ -321,7 +321,7 @@ impl Calibration {
         words.contains(&Some(Word::Failed)) || self.converged == Some(false)
     }
 
-    /// Its verdict; `None` for values that were not estimated, such as a truth.
+    /// Verdict; `None` for values that were not estimated, such as a truth.
     pub fn word(&self) -> Option<Word> {
         let stated = self.verdict.as_ref().map(|verdict| verdict.word);
         let failed = self.is_failed().then_some(Word::Failed);
@@ -353,7 +353,7 @@ impl Calibration {
     }
 
     /// A parameter by name: `gyro.scale.x` and `gyro.bias.x` in the file's quantity,
-    /// `gyro.installation.xy` the entry of the installation matrix in that row and column, the same for
+    /// `gyro.installation.xy` the entry of the misalignment matrix in that row and column, the same for
     /// `accel`; then parameters of error terms such as `accel.time_offset`, in SI.
     pub fn get(&self, name: &str) -> Option<&f64> {
         let of_triads = entry(name, |sensor| self.triad(sensor));
@@ -412,7 +412,7 @@ impl TriadRecord {
         Matrix3::from_fn(|i, j| self.scale[i] * self.installation[i][j])
     }
 
-    /// The triad, normalised by nominal scales and split in a form. A record may contain any installation matrix, so
+    /// The triad, normalised by nominal scales and split in a form. A record may contain any misalignment matrix, so
     /// the split uses `K C`, which is common to all forms.
     pub fn triad(&self, nominal: &Nominal, form: InstallationForm) -> Triad {
         let sensitivity = self.normalised(nominal);

@@ -158,7 +158,7 @@ impl AtRest {
 }
 
 impl Auxiliary {
-    /// Its estimated parameters by name.
+    /// Estimated parameters by name.
     pub fn records(&self) -> BTreeMap<String, TermRecord> {
         let sigma = self.sigma();
         let record = |k: usize| {

@@ -47,7 +47,7 @@ pub struct ThermalRecord {
 /// One coefficient.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CoefficientRecord {
-    /// Its parameter.
+    /// Parameter.
     pub parameter: String,
     /// The order of its polynomial; `None` for the rate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -62,12 +62,12 @@ pub struct CoefficientRecord {
 /// One of the recordings of a joint calibration.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RecordingRecord {
-    /// Its name.
+    /// Name.
     pub name: String,
     /// Mean temperature of its dwells, of all axes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature_degc: Option<f64>,
-    /// Its parameters when calibrated alone, by name; empty if it gives no calibration alone.
+    /// Parameters when calibrated alone, by name; empty if it gives no calibration alone.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub alone: BTreeMap<String, ValueRecord>,
     /// Deviation of its parameters from the common ones; `mounting.x` and so on, in rad, is the rotation of the whole
@@ -100,7 +100,7 @@ impl CoefficientRecord {
         })
     }
 
-    /// Its parameter and function in a form; `None` if it does not exist.
+    /// Parameter and function in a form; `None` if it does not exist.
     pub(super) fn coefficient(&self, form: InstallationForm) -> Option<Coefficient> {
         let function = match self.order {
             None => RATE,

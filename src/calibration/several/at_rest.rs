@@ -49,7 +49,7 @@ pub struct AtRest {
 pub struct MeanAtRest {
     /// Temperature in the middle, °C.
     pub temperature: f64,
-    /// Its rate, K/s.
+    /// Rate, K/s.
     pub rate: f64,
     /// Output minus that at the reference, normalised, rad/s or m/s².
     pub change: f64,
@@ -61,7 +61,7 @@ pub struct MeanAtRest {
 struct Block {
     /// Temperature of each axis in the middle, °C.
     temperature: PerSensor<[f64; 3]>,
-    /// Its rate, K/s.
+    /// Rate, K/s.
     rate: PerSensor<[f64; 3]>,
     /// Normalised.
     output: PerSensor<[f64; 3]>,

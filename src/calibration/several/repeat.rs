@@ -9,7 +9,7 @@ use crate::statistics::{FALSE_ALARM, chi_square_limit};
 /// Repeatability of a parameter between recordings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Repeatability {
-    /// Its index.
+    /// Index.
     pub parameter: usize,
     /// Standard deviation of the individual calibrations about the common curve …
     pub spread: f64,
@@ -19,7 +19,7 @@ pub struct Repeatability {
     pub claimed: f64,
     /// χ² of the deviations per degree of freedom; one if σ are correct.
     pub chi_square: f64,
-    /// Its limit at a false-alarm rate of 0.1 %.
+    /// Limit at a false-alarm rate of 0.1 %.
     pub limit: f64,
 }
 

@@ -26,7 +26,7 @@ const PART_OF_RANGE: f64 = 0.1;
 /// A recording calibrated alone.
 #[derive(Debug, Clone)]
 pub struct SeparateEstimate {
-    /// Its name.
+    /// Name.
     pub name: String,
     /// Mean temperature of each axis, °C, and its rate, K/s, over its dwells; `None` if unknown.
     pub temperature: Option<PerSensor<[f64; 3]>>,

@@ -50,7 +50,7 @@ impl Coefficient {
         state.get(self.sensor)[self.axis][self.function]
     }
 
-    /// Its value among these coefficients.
+    /// Value among these coefficients.
     pub(in crate::calibration) fn of(&self, all: &PerSensor<ThermalCoefficients>) -> f64 {
         all.get(self.sensor)[(self.parameter, self.function)]
     }

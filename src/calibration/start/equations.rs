@@ -35,9 +35,9 @@ pub struct Event {
 
 /// Gauss–Markov bias variation over an event.
 pub struct Drift {
-    /// Its stationary variance.
+    /// Stationary variance.
     pub variance: f64,
-    /// Its mean over the event, given its value at one end, divided by this value …
+    /// Mean over the event, given its value at one end, divided by this value …
     pub mean: f64,
     /// … its value at the other end …
     pub decay: f64,

@@ -365,7 +365,7 @@ mod tests {
     /// How an input follows errors, by number.
     type Errors = Vec<(Common, Matrix3<f64>)>;
 
-    /// Squared errors over variances of scale factors, installation and biases, from this many sets of
+    /// Squared errors over variances of scale factors, misalignments and biases, from this many sets of
     /// positions that are each off by random tilts.
     fn mean_squares(
         sets: usize,

@@ -37,7 +37,7 @@ pub struct Position {
     pub weighted: Vector3<f64>,
 }
 
-/// A position, and the errors that its input shares with others.
+/// A position, and the error sources it has in common with other positions.
 #[derive(Debug, Clone)]
 pub struct Known {
     pub position: Position,

@@ -20,7 +20,7 @@ const LEAST: u32 = 8;
 /// A step of smooth motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stride {
-    /// Its length, s.
+    /// Length, s.
     pub duration: f64,
     /// In its middle.
     pub middle: Instant,

@@ -56,8 +56,8 @@ pub fn clock(run: &Run) -> Option<String> {
     let mut others = moves.iter().filter(is_another);
     if let Some(first) = others.next() {
         return Some(format!(
-            "In {} of {} moves the gyros and the table turn by different angles. The first is at {:.1} s: {:.1}° \
-             by the gyros, {:.1}° by the table. Look for lost, repeated, clipped or wrapped rows there, or for logs \
+            "In {} of {} moves the gyros and the table turn by different angles. The first is at {:.1} s: the gyros \
+             measure {:.1}°, the table {:.1}°. Look for lost, repeated, clipped or wrapped rows there, or for logs \
              from different runs or clocks. Otherwise check gyro_unit, scale and the unit of the table angles.",
             1 + others.count(),
             moves.len(),
@@ -116,8 +116,8 @@ fn other_times(moves: &[Move], resolved: f64, period: f64) -> Option<String> {
     let apart = (last.late - first.late) / (last.time - first.time);
     let at = |of: &Move| nanoseconds((of.time * 10.0).round() / 10.0);
     Some(format!(
-        "The clocks of IMU and table drift apart by {:.0} ppm: the gyros turn {} than the table in the move at {} s \
-         and {} in that at {} s. Scale factors are wrong by the same amount. Check both logs for lost or repeated \
+        "The clocks of IMU and table drift apart by {:.0} ppm: the gyros turn {} than the table in the move at {} s, \
+         and {} in the move at {} s. Scale factors are wrong by the same amount. Check both logs for lost or repeated \
          rows, and check sample_period_s and the time stamps.",
         apart / PPM,
         by(first.late),
@@ -138,8 +138,8 @@ fn scale(run: &Run, moves: &[Move]) -> Option<String> {
     let off = gyros / table - 1.0;
     (table > 0.0 && off.abs() > SIGMAS * sigma + sum(|m| m.zero) / table).then(|| {
         format!(
-            "Over all {} moves the gyros turn {:.0} ppm {} than the table, but scale_sigma_ppm of \
-             [imu.prior.gyro] states {:.0} ppm. Check its scale and scale_sigma_ppm, and gyro_unit.",
+            "Over all {} moves the gyros turn {:.0} ppm {} than the table, but scale_sigma_ppm of [imu.prior.gyro] \
+             states {:.0} ppm. Check scale and scale_sigma_ppm there, and gyro_unit.",
             moves.len(),
             off.abs() / PPM,
             if off > 0.0 { "more" } else { "less" },

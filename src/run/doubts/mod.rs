@@ -39,7 +39,7 @@ fn gravity(run: &Run) -> Option<String> {
     (site.is_known && off.abs() > limit).then(|| {
         format!(
             "gravity_m_s2 = {} is {:.0} mGal {} normal gravity at latitude {:.4}°, height {:.0} m (limit {:.0} mGal, \
-             false-alarm rate 0.1 %). This error goes directly into the accelerometer scale factors. Check \
+             false-alarm rate 0.1 %). This difference goes directly into the accelerometer scale factors. Check \
              gravity_m_s2, latitude_deg and height_m.",
             site.gravity,
             off.abs() / MILLIGAL,
@@ -66,7 +66,7 @@ fn coverage(run: &Run) -> Option<String> {
     (!off.is_empty()).then(|| {
         format!(
             "The table log ({first}–{last} s) {} the IMU log ({start}–{end} s). The rest of the IMU log cannot be \
-             used. Check that both come from the same run and clock.",
+             used. Check that both logs come from the same run and clock.",
             off.join(" and ")
         )
     })

@@ -11,7 +11,7 @@ const UPRIGHT: f64 = 10.0 * DEGREE;
 /// A dwell, evaluated with nominal scales and prior biases.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rest {
-    /// Its samples, and the table's position.
+    /// Samples, and the table's position.
     pub dwell: Dwell,
     /// Mean specific force along body axes, m/s².
     pub force: Vector3<f64>,
@@ -26,7 +26,7 @@ pub struct Up {
     pub axis: usize,
     /// Whether it points down.
     pub down: bool,
-    /// Its angle from the vertical, rad.
+    /// Angle from the vertical, rad.
     pub tilt: f64,
 }
 

@@ -24,7 +24,7 @@ const NEAR_AXIS: f64 = 15.0 * DEGREE;
 /// A turn, evaluated with nominal scales; the gyro zero is the output in the previous dwell.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Turn {
-    /// Its samples.
+    /// Samples.
     pub samples: Range<usize>,
     /// Unit vector along body axes, in their positive half.
     pub axis: Vector3<f64>,

@@ -11,7 +11,7 @@ use crate::simulation::Scenario;
 pub struct AccuracyStudy {
     /// The simulated scenario.
     pub scenario: Scenario,
-    /// The filter's installation form; the truth has that of the scenario.
+    /// The filter's misalignment form; the truth has that of the scenario.
     pub form: InstallationForm,
     /// Error terms of the truth that the filter does not model.
     pub unmodelled: Vec<ErrorTerm>,

@@ -17,7 +17,7 @@ use crate::study::StudyError;
 /// One run. Errors are estimate minus truth; everything is in the general form.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Trial {
-    /// Its number, the stream of its random numbers.
+    /// Number, the stream of its random numbers.
     pub run: u64,
     /// Reason for failure of the filter; `None` if it did not fail.
     pub failure: Option<String>,
@@ -56,7 +56,7 @@ pub struct Filtered {
     pub velocity: Nis,
     /// NIS of table attitude.
     pub table: Nis,
-    /// Test of the installation form.
+    /// Test of the misalignment form.
     pub form_test: Option<FormTest>,
 }
 

@@ -34,7 +34,7 @@ pub struct Part {
     pub group: Group,
     /// RMS position error of this group alone, nmile.
     pub alone: f64,
-    /// Its share of the variance, as in [`Budget`].
+    /// Share of the variance, as in [`Budget`].
     pub share: f64,
 }
 

@@ -31,12 +31,12 @@ pub enum Estimator {
     LongFilter,
 }
 
-/// An estimator in an installation form.
+/// An estimator in a misalignment form.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Method {
     /// The estimator.
     pub estimator: Estimator,
-    /// The installation form.
+    /// The misalignment form.
     pub form: InstallationForm,
 }
 
@@ -57,7 +57,7 @@ impl Method {
 /// One instrument.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Trial {
-    /// Its number, the stream of its random numbers.
+    /// Number, the stream of its random numbers.
     pub run: u64,
     /// Calibration by each of [`Method::all`], or the reason for failure.
     pub calibrations: Vec<Result<Calibrated, String>>,
@@ -79,7 +79,7 @@ pub struct Calibrated {
     pub covariance: ParameterMatrix,
     /// False if the method reports that it did not converge.
     pub converged: bool,
-    /// Whether the method reports that the data reject its installation form.
+    /// Whether the method reports that the data reject its misalignment form.
     pub rejects_form: bool,
 }
 

@@ -38,7 +38,7 @@ fn what_exposure_says_is_what_nonlinear_navigation_does_for_many_hours() {
     ]);
 }
 
-/// Installation form, minutes, and allowed difference of positions relative to the largest.
+/// Misalignment form, minutes, and allowed difference of positions relative to the largest.
 fn exposure_against_navigation(cases: &[(InstallationForm, u32, f64)]) {
     // Scale factors differ by a few parts in a thousand from those of the simulated instrument, and
     // half a degree of attitude or a hundred miles are no longer small.

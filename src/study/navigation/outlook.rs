@@ -12,7 +12,7 @@ pub struct Outlook {
     pub time: f64,
     /// The actual error; `None` if the truth is not known.
     pub error: Option<NavigationError>,
-    /// Its 1σ predicted from the calibration's covariance, in the order of
+    /// 1σ predicted from the calibration's covariance, in the order of
     /// [`NavigationError::to_vector`]; `None` if the calibration states no σ.
     pub sigma: Option<SVector<f64, STATES>>,
 }

@@ -16,7 +16,7 @@ const LENGTHS: Units = &[("nmile", NAUTICAL_MILE), ("m", 1.0)];
 pub struct Quantity {
     /// Such as `pitch`.
     pub name: &'static str,
-    /// Its name in documents, with its unit.
+    /// Name in documents, with its unit.
     pub key: &'static str,
     /// Index in [`Outlook::sigma`]; for a horizontal length, that of its first component.
     place: usize,
@@ -56,7 +56,7 @@ impl Quantity {
         horizontal(6, "position, horizontal", "position_nmile", LENGTHS),
     ];
 
-    /// Its name up to the comma, without the kind of length.
+    /// Name up to the comma, without the kind of length.
     pub fn short(self) -> &'static str {
         self.name.split(',').next().unwrap_or(self.name)
     }

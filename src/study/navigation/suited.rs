@@ -74,7 +74,7 @@ impl Mission {
     }
 
     /// Navigation errors of an estimate, at the start and after each interval. The truth may have any
-    /// installation form.
+    /// misalignment form.
     ///
     /// # Errors
     /// As for [`Self::navigate`].

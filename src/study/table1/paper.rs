@@ -131,11 +131,11 @@ pub static TABLE: [Published; 4] = [
 /// A reading of the paper.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reading {
-    /// Its description.
+    /// Description.
     pub name: &'static str,
     /// Treatment of the entries of `K C`.
     pub installation: Installation,
-    /// Factor applied to the drawn installation angles.
+    /// Factor applied to the drawn misalignment angles.
     pub angles: f64,
     /// Length of the runs in h, if it differs from that of the study.
     pub hours: Option<f64>,
@@ -157,7 +157,7 @@ pub enum Kind {
 /// Treatment of the ratios `R_mn = A_mn / A_mm` of `A = K C` from six positions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Installation {
-    /// Closed form of the installation form: all six ratios, or half differences of the pairs.
+    /// Closed form of the misalignment form: all six ratios, or half differences of the pairs.
     OfForm,
     /// Three angles from the entries above the diagonal.
     Upper,

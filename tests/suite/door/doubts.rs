@@ -101,8 +101,8 @@ fn a_row_that_lacks_a_value_is_missing_and_one_that_lacks_all_is_another_sensors
         rows.into_iter().enumerate().map(spoilt).collect()
     };
     let run = reread(|_| (), blank);
-    assert!(says(&run, "2 row(s)") && says(&run, "count as missing"));
-    assert!(says(&run, "1 row(s)") && says(&run, "turncal skipped them"));
+    assert!(says(&run, "turncal counts 2 rows") && says(&run, "as missing"));
+    assert!(says(&run, "turncal skipped 1 row of"));
     let whole = reread(|_| (), as_they_are);
     assert_eq!(run.recording.imu.len(), whole.recording.imu.len());
 }

@@ -488,12 +488,8 @@ fn each_wrong_calibration_has_its_message() {
             "\"gyro\":{\"scale\":[1,1,1e999]",
             "out of range",
         ),
-        ("[[1,0],[0,2]]", "[[1,0]]", "1 row(s) in covariance & 2"),
-        (
-            "[[1,0],[0,2]]",
-            "[[1,0],[2]]",
-            "1 value(s) in row 2 & square",
-        ),
+        ("[[1,0],[0,2]]", "[[1,0]]", "1 row in covariance & 2"),
+        ("[[1,0],[0,2]]", "[[1,0],[2]]", "1 value in row 2 & square"),
         ("[[1,0],[0,2]]", "[[1,0],[0,-2]]", "row 2 & below zero"),
         (
             "gyro.scale.x",

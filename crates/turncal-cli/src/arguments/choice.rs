@@ -41,7 +41,7 @@ pub const REQUIRED: [Choice<&str>; 9] = [
     ("accel.bias", "D of the accelerometers", "accel.bias."),
 ];
 
-/// Forms of the installation matrix.
+/// Forms of the misalignment matrix.
 pub const FORMS: [Choice<InstallationForm>; 3] = [
     (
         "general",

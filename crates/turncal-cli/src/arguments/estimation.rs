@@ -17,7 +17,7 @@ pub struct Estimation {
     /// Estimation method
     #[arg(long, value_parser = one_of(&METHODS), default_value = "ekf")]
     pub method: Method,
-    /// Form of the installation matrix
+    /// Form of the misalignment matrix
     #[arg(long, value_parser = one_of(&FORMS), default_value = "general")]
     installation: InstallationForm,
     /// Observations used by the filter [default: table if the run has a table log, otherwise velocity]

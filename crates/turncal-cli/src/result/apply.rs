@@ -11,6 +11,7 @@ use crate::terminal::{Activity, stream};
 use turncal::calibration::result::Calibration;
 use turncal::calibration::{Correction, TEMPERATURE_TOLERANCE, ThermalRecord};
 use turncal::imu::{Sensor, Term};
+use turncal::number::{count, rounded};
 use turncal::run::Run;
 use turncal::units::PPM;
 use turncal_files::export::Samples;
@@ -95,9 +96,9 @@ impl Apply {
         }
         drop(activity);
         tell!(
-            "{} rows of {} s{}; x right, y front, z up, along: {}",
-            run.recording.imu.len() - if self.fill { 0 } else { lost },
-            run.recording.imu.period,
+            "wrote {} rows ({} Hz){}. Axes: x right, y front, z up; body frame: {}",
+            count(run.recording.imu.len() - if self.fill { 0 } else { lost }),
+            rounded(run.recording.imu.period.recip(), 6),
             match (lost, self.fill) {
                 (0, _) => String::new(),
                 (lost, true) =>
@@ -121,7 +122,7 @@ fn notes(record: &Calibration, correction: &Correction, run: &Run) -> Vec<String
     if !kept.is_empty() {
         let names = kept.join(", ");
         notes.push(format!(
-            "the calibration did not determine {names}: they keep the values of before"
+            "the calibration did not determine {names}: they keep their prior values"
         ));
     }
     if record.unit.is_none() {

@@ -12,7 +12,7 @@ use turncal_report as report;
 
 /// Compares calibrations, parameter by parameter, with their σ
 ///
-/// All calibrations are first converted to the general installation form and one body frame. Differences are from the
+/// All calibrations are first converted to the general misalignment form and one body frame. Differences are from the
 /// truth or, for two calibrations without a truth, from the first. For three or more, the mean, scatter and χ² of the
 /// scatter relative to the stated σ are also shown, and outliers are named. A calibration whose verdict is FAILED is
 /// refused without --force.

@@ -61,7 +61,7 @@ pub struct Navigate {
         value_parser = attitude
     )]
     attitude_deg: Attitude,
-    /// Triads with calibration errors
+    /// Sensors whose errors are included: gyros, accelerometers or both
     #[arg(long, value_enum, default_value_t = Errors::Both)]
     errors: Errors,
     /// Duration in hours (whole minutes, up to 1000)
@@ -174,8 +174,8 @@ fn attitude(text: &str) -> Result<Attitude, String> {
     let angles: Vec<&str> = text.split(',').collect();
     let [pitch, roll, heading] = angles[..] else {
         return Err(format!(
-            "expected pitch, roll and heading with commas between, found {} number(s)",
-            angles.len()
+            "found {}, expected pitch, roll and heading with commas between",
+            turncal_input::counted(angles.len(), "number")
         ));
     };
     Ok(Attitude([

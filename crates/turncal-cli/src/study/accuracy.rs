@@ -41,7 +41,7 @@ pub struct Accuracy {
     /// Observations used by the filter
     #[arg(long, value_parser = one_of(&AIDINGS), default_value = "table")]
     aiding: Aiding,
-    /// Installation form of the filter
+    /// Misalignment form of the filter
     #[arg(long, value_parser = one_of(&FORMS), default_value = "general")]
     installation: InstallationForm,
     /// Installation of the simulated instruments: a TOML file or an embedded name [default: from the scenario]

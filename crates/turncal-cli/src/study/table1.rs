@@ -7,9 +7,9 @@ use turncal::study::table1::paper;
 use turncal::units::DEGREE;
 use turncal_report as report;
 
-/// Reproduces Table 1 of the paper: navigation errors due to a simplified installation form
+/// Reproduces Table 1 of the paper: navigation errors due to a simplified misalignment form
 ///
-/// Draws installation angles as in the paper, calibrates gyros and accelerometers with the closed form in the six-angle
+/// Draws misalignment angles as in the paper, calibrates gyros and accelerometers with the closed form in the six-angle
 /// and the three-angle form, without noise, and navigates with the remaining errors. Shows the largest errors next to
 /// the figures in the paper, for every reading of its text, and states which figures a correct program reproduces.
 #[derive(Debug, clap::Args)]

@@ -20,7 +20,7 @@ const FORMAT: &str = "turncal-job/1";
 pub struct Job {
     /// Always [`FORMAT`].
     format: String,
-    /// Its kind.
+    /// Kind.
     pub job: JobKind,
     /// The program's version.
     pub version: String,

@@ -14,9 +14,9 @@ use turncal_input::FileError;
 pub struct Found {
     /// Name, such as `gyros`.
     pub what: &'static str,
-    /// Its value.
+    /// Value.
     pub value: String,
-    /// Its certainty.
+    /// Certainty.
     pub certainty: Certainty,
     /// The reason.
     pub why: String,
@@ -37,42 +37,48 @@ impl Draft {
     /// Fails for a damaged log, and for a field that the log does not show but a run needs.
     pub(crate) fn check(&self, file: &Path) -> Result<(), FileError> {
         let damage = self.streams.as_ref().and_then(|of| of.damage.clone());
-        let question = self.contradiction.clone().or_else(|| self.open_question());
         let wrong =
             |[found, expected, advice]: [String; 3]| FileError::of(file, found, expected, advice);
-        damage.or(question.map(wrong)).map_or(Ok(()), Err)
+        let unknown =
+            |[what, why, advice]: [String; 3]| FileError::unknown(file, &what, &why, &advice);
+        let contradiction = self.contradiction.clone().map(wrong);
+        let error = damage.or(contradiction);
+        let error = error.or_else(|| self.open_question().map(unknown));
+        error.map_or(Ok(()), Err)
     }
 
-    /// The first open field that prevents a run: evidence in the log, requirement, remedy.
+    /// The first open field that prevents a run: what is unknown, why, and the remedy.
     fn open_question(&self) -> Option<[String; 3]> {
         let (_, remarks) = self.run_file("log");
         let (field, why) = remarks.open.into_iter().next()?;
         let is_zero = |motion: &Motion| motion.gravity == 0.0;
         let has_accels =
             self.columns.triads.accel.is_some() && !self.motion.as_ref().is_some_and(is_zero);
-        let (expected, advice) = match &*field {
+        let (what, advice) = match &*field {
             "gyro_unit" if !has_accels => (
-                "gyros of a known unit, and accelerometers",
-                "Give both files: `turncal init GYROS ACCELS -o run.toml`. For an Allan analysis of the gyros alone, \
-                 set --gyro-unit.",
+                "the unit of the gyros",
+                "Give gyros and accelerometers: `turncal init GYROS ACCELS -o run.toml`. For an Allan analysis of the \
+                 gyros alone, add --gyro-unit.",
             ),
-            "gyro_unit" => ("the unit of the gyros", "Set it with --gyro-unit."),
+            "gyro_unit" => (
+                "the unit of the gyros",
+                "Add --gyro-unit (deg/s, rad/s, or '1/131 deg/s').",
+            ),
             "accel_unit" => (
                 "the unit of the accelerometers",
-                "Set it with --accel-unit.",
+                "Add --accel-unit (g, m/s^2, or '1/16384 g').",
             ),
             "scale" => (
                 "the size of one count",
-                "Take it from the data sheet and set it, e.g. --gyro-unit '1/131 deg/s' or --accel-unit '1/16384 g'.",
+                "Add the size from the data sheet, such as --gyro-unit '1/131 deg/s' or --accel-unit '1/16384 g'.",
             ),
-            "sample_period_s" => ("the sample rate", "Set it with --rate."),
-            _ => (
-                "all fields that run.toml needs",
+            "sample_period_s" => ("the sample rate", "Add --rate."),
+            other => (
+                other,
                 "Write a draft with `turncal init LOG -o run.toml` and complete it.",
             ),
         };
-        let found = format!("no evidence for `{field}` ({why})");
-        Some([found, expected.to_owned(), advice.to_owned()])
+        Some([what.to_owned(), why, advice.to_owned()])
     }
 
     /// Units that are neither known nor whole counts: a rate or a unit may be wrong that only turns and gravity show.

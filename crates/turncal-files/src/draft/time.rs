@@ -27,7 +27,7 @@ pub enum Certainty {
 }
 
 impl Certainty {
-    /// Its word.
+    /// Word.
     pub fn word(self) -> &'static str {
         match self {
             Self::Certain => "certain",

@@ -22,7 +22,7 @@ const PULSE_SUMS: f64 = 0.5;
 /// Unit of a triad, as far as known.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Unit {
-    /// Its name in `run.toml`, if known.
+    /// Name in `run.toml`, if known.
     pub word: Option<&'static str>,
     pub why: String,
     /// Whether it is confirmed by motion or stated by the user.

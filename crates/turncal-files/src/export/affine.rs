@@ -61,7 +61,7 @@ impl Residual {
         Sensor::ALL.into_iter().map(of).filter(exceeds).collect()
     }
 
-    /// Its size, in a sentence.
+    /// Size, in a sentence.
     pub fn words(&self) -> String {
         let scale = self.errors.diagonal().amax();
         let mut across = self.errors;

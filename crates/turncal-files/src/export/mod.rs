@@ -28,7 +28,7 @@ use values::Values;
 /// A format of a calibration.
 #[derive(Debug, Clone, Copy)]
 pub struct Format {
-    /// Its name on the command line.
+    /// Name on the command line.
     pub name: &'static str,
     /// Extension of its files.
     pub extension: &'static str,

@@ -28,7 +28,7 @@ const TASKS: usize = 64;
 pub struct Samples<'a> {
     /// Their run.
     pub run: &'a Run,
-    /// Its correction.
+    /// Correction.
     pub correction: &'a Correction,
     /// Whether missing samples are also written, interpolated, with 1 in a column `filled`.
     pub fill: bool,

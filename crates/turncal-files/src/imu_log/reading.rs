@@ -6,7 +6,7 @@ use super::settings::{ImuLog, Layout};
 use crate::temperature::Temperatures;
 use turncal::imu::Output;
 use turncal::recording::ImuSamples;
-use turncal_input::FileError;
+use turncal_input::{FileError, counted};
 use turncal_logs::clock::{Stamp, Stamps, Wander};
 use turncal_logs::rows::LogRows;
 
@@ -102,23 +102,36 @@ impl<'a> Reading<'a> {
     /// Remarks on rows that are not samples, one sentence each.
     pub fn notes(&self) -> impl Iterator<Item = String> {
         let file = self.log.source.file.display();
-        let blank = "are empty in the columns of both triads. turncal skipped them.";
-        let lacking = "lack a gyro or accelerometer value and count as missing.";
-        let all = [(self.blank, blank), (self.lacking, lacking)].into_iter();
-        let found = all.filter(|(rows, _)| *rows > 0);
-        found.map(move |(rows, what)| format!("{rows} row(s) of {file} {what}"))
+        let blank = (self.blank > 0).then(|| {
+            let rows = counted(self.blank, "row");
+            format!("turncal skipped {rows} of {file} with empty columns of both triads.")
+        });
+        let lacking = (self.lacking > 0).then(|| {
+            let rows = counted(self.lacking, "row");
+            format!(
+                "turncal counts {rows} of {file} without a gyro or accelerometer value as missing."
+            )
+        });
+        [blank, lacking].into_iter().flatten()
     }
 
     fn too_few(&self, csv: &LogRows) -> FileError {
         let (found, advice) = match self.lacking {
             0 => (String::new(), "Record a run with dwells and turns."),
             lacking => (
-                format!(" and {lacking} rows that lack a gyro or accelerometer value"),
+                format!(
+                    " and {} without a gyro or accelerometer value",
+                    counted(lacking, "row")
+                ),
                 "If gyros and accelerometers are in separate rows, `turncal init` drafts a run.toml for that layout.",
             ),
         };
-        let found = format_args!("{} samples{found}", self.held.len());
-        csv.error(found, format_args!("at least {FEWEST_SAMPLES}"), advice)
+        let samples = counted(self.held.len(), "sample");
+        csv.error(
+            format_args!("{samples}{found}"),
+            format_args!("at least {FEWEST_SAMPLES}"),
+            advice,
+        )
     }
 }
 

@@ -298,7 +298,7 @@ fn a_clock_that_wraps_goes_on_and_one_that_was_set_begins_a_stretch() {
     let paused = |k: usize| 10 * k as u64 + 600_000 * (k / 500) as u64;
     for breaks in [Breaks::Pauses, Breaks::Settings] {
         let (imu, notes) = read(&paused, 1e3, breaks).unwrap();
-        assert!(notes.contains("paused 19 time(s)"), "{notes}");
+        assert!(notes.contains("paused 19 times"), "{notes}");
         assert_eq!(imu.len(), 10_000 + 19 * 99);
         for (number, stretch) in imu.stretches.iter().enumerate() {
             let begin = 599 * number;

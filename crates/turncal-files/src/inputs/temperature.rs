@@ -3,7 +3,7 @@
 use crate::schema::{TemperatureColumn, TemperatureUnit};
 use turncal::imu::PerSensor;
 use turncal::recording::{TEMPERATURE_SPACING, Temperature, TemperatureFacts};
-use turncal_input::{FileError, OneOrThree};
+use turncal_input::{FileError, OneOrThree, counted};
 use turncal_logs::rows::LogRows;
 
 /// Values beyond this limit, °C, mean that the column has another unit or is not a temperature.
@@ -193,8 +193,9 @@ impl Channel {
         if missing > 0 {
             let name = &self.name;
             notes.push(format!(
-                "{file}, column {name}: {missing} row(s) contain no temperature, the first in line {line}. turncal \
-                 interpolated it."
+                "{file}, column {name}: no temperature in {}, the first in line {line}. turncal interpolated the \
+                 temperature there.",
+                counted(missing, "row")
             ));
         }
         notes

@@ -13,9 +13,9 @@ use crate::directories::write_whole;
 use turncal::calibration::result::{Calibration, FORMAT, FORMAT_WITH_TEMPERATURE, TriadRecord};
 use turncal::imu::{AXES, PARAMETERS, PerSensor, Sensor, Term, ThermalRange, Triad};
 use turncal::units::{DEGREE, STANDARD_GRAVITY};
-use turncal_input::{FileError, Place, excerpt, small_file, suggestion};
+use turncal_input::{FileError, Place, counted, excerpt, small_file, suggestion};
 
-/// A larger entry of an installation matrix belongs to an axis perpendicular to its name.
+/// A larger entry of a misalignment matrix belongs to an axis perpendicular to its name.
 const INSTALLATION: f64 = 100.0;
 /// Bias limit, in rad/s or m/s², beyond the range of any instrument, including registers with zero at mid-range.
 const BIAS: f64 = 1e6;
@@ -150,15 +150,15 @@ fn check_covariance(record: &Calibration) -> Checked {
     expect!(
         record.covariance.len() == size,
         format!("{size} rows, one per entry of parameters"),
-        "{} row(s) in covariance",
-        record.covariance.len()
+        "{} in covariance",
+        counted(record.covariance.len(), "row")
     );
     for (i, row) in record.covariance.iter().enumerate() {
         expect!(
             row.len() == size,
             format!("{size} values, because the covariance is square"),
-            "{} value(s) in row {} of covariance",
-            row.len(),
+            "{} in row {} of covariance",
+            counted(row.len(), "value"),
             i + 1
         );
         expect!(

@@ -5,8 +5,8 @@ use std::path::Path;
 use super::median;
 use super::{Breaks, Clock, REACH, TimeUnit};
 use crate::rows::LogRows;
-use turncal_input::FileError;
 use turncal_input::units::nanoseconds;
+use turncal_input::{FileError, counted};
 
 impl Clock<'_> {
     /// Starts reading a file.
@@ -393,9 +393,9 @@ impl Stamps {
         let ends = self.pauses.first().zip(self.pauses.last());
         notes.extend(ends.map(|(first, last)| {
             format!(
-                "{file}: recording paused {} time(s), first before line {}, for longer in total than it ran. turncal \
-                    counts {BREAK} s of each pause as missing rows and ignores the other {} s.",
-                self.pauses.len(),
+                "{file}: recording paused {}, first before line {}, for longer in total than it ran. turncal counts \
+                 {BREAK} s of each pause as missing rows and ignores the other {} s.",
+                counted(self.pauses.len(), "time"),
                 first.line,
                 nanoseconds(last.left_out)
             )
@@ -403,14 +403,16 @@ impl Stamps {
         let (same, line) = self.at_once;
         notes.extend((same > 0).then(|| {
             format!(
-                "{same} row(s) of {file} repeat the previous time with other values, the first in line {line}. Each \
-                    counts as a sample."
+                "{file}: {} with the time of the row before but other values, the first in line {line}. Each counts \
+                 as a sample.",
+                counted(same, "row")
             )
         }));
         let (late, line) = self.out_of_order;
         notes.extend((late > 0).then(|| {
             format!(
-                "{late} row(s) of {file} are out of order, the first in line {line}. turncal sorted them by time."
+                "{file}: {} out of order, the first in line {line}. turncal sorted all rows by time.",
+                counted(late, "row")
             )
         }));
         notes.extend(self.wraps_at.and_then(|size| match self.unit {

@@ -16,7 +16,7 @@ const BYTES_AHEAD: usize = 1 << 18;
 #[derive(Debug, Clone, Default)]
 pub struct Line {
     pub text: Vec<u8>,
-    /// Its number in the file.
+    /// Number in the file.
     pub number: u64,
     /// Whether something ends it, so that it is all there.
     pub is_ended: bool,

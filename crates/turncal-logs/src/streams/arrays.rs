@@ -24,7 +24,7 @@ pub struct Array {
     pub size: usize,
     pub fields: Vec<Field>,
     pub open: Open,
-    /// Its offset in the file.
+    /// Offset in the file.
     pub offset: u64,
 }
 
@@ -58,7 +58,7 @@ impl Array {
         ))
     }
 
-    /// Its columns with their layout: the longest dimension (the first of equal ones) gives the rows.
+    /// Columns with their layout: the longest dimension (the first of equal ones) gives the rows.
     fn cursors(self) -> Vec<Cursor> {
         let rows = self.shape.iter().copied().max().unwrap_or(1);
         let columns = self

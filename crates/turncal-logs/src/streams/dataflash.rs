@@ -130,7 +130,7 @@ impl Format {
         ["IMU", "ACC", "GYR"].contains(&stem)
     }
 
-    /// Its corrections.
+    /// Corrections.
     fn undo(&self) -> Undo {
         let corrected = PerSensor::from_fn(|sensor| {
             let names = sensor.pick(["GyrX", "GyrY", "GyrZ"], ["AccX", "AccY", "AccZ"]);

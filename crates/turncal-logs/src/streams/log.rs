@@ -5,7 +5,7 @@ use super::bytes::Broken;
 /// A column of a stream.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Column {
-    /// Its name in the file.
+    /// Name in the file.
     pub name: String,
     /// In the spelling of `run.toml`; empty if not stated.
     pub unit: &'static str,
@@ -24,7 +24,7 @@ impl Column {
 /// Samples of one kind from one source.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Stream {
-    /// Its name in `run.toml`.
+    /// Name in `run.toml`.
     pub name: String,
     /// Empty until its first sample, if only that defines them.
     pub columns: Vec<Column>,

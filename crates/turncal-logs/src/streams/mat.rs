@@ -95,7 +95,7 @@ struct Reader {
     /// Unpacked bytes so far, and all of them.
     at: u64,
     end: u64,
-    /// Its offset in the file.
+    /// Offset in the file.
     offset: u64,
     big_endian: bool,
 }
@@ -136,7 +136,7 @@ impl Reader {
         Ok(kind == MATRIX)
     }
 
-    /// The same with the rest of its bytes in memory.
+    /// A copy with the rest of its bytes in memory.
     fn kept(mut self) -> Result<Self, Broken> {
         let (mut bytes, length) = (Vec::new(), self.end - self.at);
         let read = (&mut self.bytes).take(length).read_to_end(&mut bytes);

@@ -42,7 +42,7 @@ impl Value {
 pub struct Row {
     columns: Vec<String>,
     values: Vec<Value>,
-    /// Its offset in the file.
+    /// Offset in the file.
     pub offset: u64,
 }
 
@@ -66,7 +66,7 @@ pub struct Table {
 
 struct Page {
     bytes: Vec<u8>,
-    /// Its offset in the file, and the offset of its header.
+    /// Offset in the file, and the offset of its header.
     offset: u64,
     begin: usize,
     is_leaf: bool,

@@ -16,12 +16,12 @@ pub struct Quantity {
     pub unit: &'static str,
     /// The unit in SI.
     pub value: f64,
-    /// Its key in documents.
+    /// Key in documents.
     pub key: &'static str,
 }
 
 impl Quantity {
-    /// Its letter in the standards.
+    /// Letter in the standards.
     pub fn letter(&self) -> &'static str {
         self.name.rsplit(' ').next().unwrap_or_default()
     }

@@ -62,9 +62,9 @@ pub fn warnings(analysis: &NoiseAnalysis) -> Vec<String> {
             }
             if axis.knocks > 0 {
                 warnings.push(format!(
-                    "{name} {letter}: {} jump(s) of more than 8σ between samples (knocks or faulty samples) raise \
-                     the deviations. Choose a quieter segment.",
-                    count(axis.knocks)
+                    "{name} {letter}: {} of more than 8σ between samples, from knocks or faulty samples, raised the \
+                     deviations. Choose a quieter segment.",
+                    several(axis.knocks, "jump")
                 ));
             }
         }

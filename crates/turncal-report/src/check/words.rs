@@ -135,7 +135,8 @@ fn of_motion(survey: &Survey) -> Vec<String> {
     if survey.rests.len() < 2 {
         findings.push(format!(
             "The recording has fewer than two dwells. Keep the instrument stationary for {LONG_ENOUGH} s or more \
-             between turns. If it was, check bias_sigma of the gyros and the noise figures."
+             between turns. If the instrument was stationary, bias_sigma of the gyros or the noise in run.toml is too \
+             small: check both."
         ));
         return findings;
     }

@@ -55,7 +55,7 @@ fn errors(experiment: &Experiment, navigated: &Navigated) -> Table {
         .section([last])
         .note(
             "Over all instruments. Largest: maximum over all minutes. Closed form : EKF: ratio of the medians in the \
-             same installation form (above 1, the EKF is better); intervals by bootstrap.",
+             same misalignment form (above 1, the EKF is better); intervals by bootstrap.",
         )
 }
 

@@ -15,7 +15,7 @@ pub fn title(quantity: Quantity) -> String {
     }
 }
 
-/// Its unit: symbol, name in files, size in SI.
+/// Unit: symbol, name in files, size in SI.
 fn unit(quantity: Quantity) -> (&'static str, &'static str, f64) {
     match quantity {
         Quantity::Parameter(index) => {
@@ -38,7 +38,7 @@ pub fn symbol(quantity: Quantity) -> &'static str {
     unit(quantity).0
 }
 
-/// Its unit as a name in files.
+/// Unit as a name in files.
 pub fn unit_key(quantity: Quantity) -> &'static str {
     unit(quantity).1
 }

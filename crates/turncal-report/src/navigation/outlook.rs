@@ -11,7 +11,7 @@ const HEADING: &str = "Navigation with this calibration";
 pub struct Flown {
     /// Motion of the body, such as `stationary and level`.
     pub how: &'static str,
-    /// Its conclusion, in a sentence.
+    /// Conclusion, in a sentence.
     pub shows: &'static str,
     /// The final state with each calibration, in the order of the methods.
     pub ends: Vec<Outlook>,

@@ -364,7 +364,7 @@ pub enum PdfError {
     NoGlyph {
         /// The character.
         character: char,
-        /// Its position.
+        /// Position.
         text: String,
     },
     /// The file would violate the standard.

@@ -21,15 +21,15 @@ pub use layout::{Frame, PdfError};
 /// A file in a PDF.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Attached {
-    /// Its name.
+    /// Name.
     pub name: String,
     /// Its MIME type.
     pub mime: &'static str,
-    /// Its description.
+    /// Description.
     pub description: String,
     /// Whether it has the same content as the pages, in machine-readable form.
     pub alternative: bool,
-    /// Its content.
+    /// Content.
     pub bytes: Vec<u8>,
 }
 

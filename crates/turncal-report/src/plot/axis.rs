@@ -22,9 +22,9 @@ pub enum Kind {
 /// Specification of an axis. Its ends are those of the data unless given.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Axis {
-    /// Its title; the panel provides that of the vertical axis.
+    /// Title; the panel provides that of the vertical axis.
     pub title: String,
-    /// Its scaling.
+    /// Scaling.
     pub kind: Kind,
     /// Fixed ends.
     pub ends: Option<(f64, f64)>,

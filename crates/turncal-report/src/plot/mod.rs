@@ -14,7 +14,7 @@ pub use series::{Anchor, Color, Mark, Pen, Point, Series, Shape, Upright};
 pub struct Plot {
     /// Name of its file, such as `sigma.svg`.
     pub file: String,
-    /// Its heading.
+    /// Heading.
     pub heading: String,
     /// Instructions for reading it, one or two sentences.
     pub caption: String,

@@ -3,9 +3,9 @@
 /// A series drawn with one pen.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
-    /// Its shape.
+    /// Shape.
     pub shape: Shape,
-    /// Its pen.
+    /// Pen.
     pub pen: Pen,
     /// Name at the right end of the panel.
     pub label: Option<String>,
@@ -98,7 +98,7 @@ impl Shape {
         }
     }
 
-    /// Its right end.
+    /// Right end.
     pub(crate) fn end(&self) -> Option<Point> {
         let is_known = |point: &Point| point.1.is_finite();
         match self {
@@ -150,7 +150,7 @@ impl Series {
         Self::whiskers(mark, points.into_iter().map(|at| (at, (at.1, at.1))))
     }
 
-    /// The same with an interval at each point.
+    /// A copy with an interval at each point.
     pub fn whiskers(mark: Mark, points: impl IntoIterator<Item = (Point, (f64, f64))>) -> Self {
         Self::new(Shape::Marks(mark, points.into_iter().collect()))
     }

@@ -14,7 +14,7 @@ const MANY: f64 = 100.0;
 
 /// The complete report on the study.
 pub fn document(table: &Table1) -> Document {
-    let title = "Cost of a simplified installation form: Table 1 of the paper";
+    let title = "Cost of a simplified misalignment form: Table 1 of the paper";
     let mut document = Document::new(title);
     document.conclusions = List::new("Verdict", verdict::sentences(table));
     document.both(facts(table));

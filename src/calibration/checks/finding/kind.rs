@@ -38,12 +38,12 @@ macro_rules! kinds {
                 match self { $(Self::$variant => $name,)* }
             }
 
-            /// Its severity.
+            /// Severity.
             pub fn level(self) -> Level {
                 match self { $(Self::$variant => Level::$level,)* }
             }
 
-            /// Its meaning, cause and remedy.
+            /// Meaning, cause and remedy.
             pub fn explanation(self) -> &'static str {
                 match self { $(Self::$variant => $explanation,)* }
             }
@@ -61,9 +61,9 @@ kinds! {
          usual causes are a wrong scale, unit, sample period or axis in run.toml, or a recording with almost no \
          motion. Run `turncal check`, which compares scale, unit and axes with gravity and the turns."
     Unexplained = "W03" "unexplained" Failed:
-        "The residuals are too large for any noise figure, so the values are meaningless. The usual causes are \
-         labels or table attitudes from a different recording, a wrong axis order, a wrong unit, or a mount that \
-         slipped. The finding names the interval with the largest residuals; look there first."
+        "The residuals are too large for any noise figure, so the values are meaningless. The usual causes are labels \
+         or table attitudes from a different recording, a wrong axis order, a wrong unit, or a mount that slipped. \
+         Look first at the interval with the largest residuals, which the finding names."
     NotObserved = "W04" "not-observed" Partial:
         "The recording adds little information about these parameters: σ is still more than half of the prior, so \
          turncal keeps their values and σ from [imu.prior]. Add positions that put each axis up and down, and a turn of 90° or more about each axis. \
@@ -81,9 +81,9 @@ kinds! {
          turncal used its own estimate for weights and σ. To state the estimate for the next recording, copy the lines \
          of the finding into [imu.noise]; to use the stated noise anyway, add --noise stated."
     ScatterAtRest = "W08" "scatter-at-rest" Care:
-        "You asked for the stated noise, but in dwells the samples scatter more or less than it implies. The estimate uses 0.1 s \
-         averages, so mount vibration adds to it. Record an hour at rest, run `turncal allan` to separate noise from \
-         vibration, and state the result in [imu.noise]."
+        "You asked for the stated noise, but in dwells the samples scatter more or less than this noise implies. The \
+         estimate uses 0.1 s averages, so mount vibration adds to it. Record an hour at rest, run `turncal allan` to \
+         separate noise from vibration, and state the result in [imu.noise]."
     Inconsistent = "W10" "inconsistent" Care:
         "The normalised innovation squared (NIS) is outside its 99.9 % interval: the residuals are larger or smaller \
          than predicted. If they are larger only after moves, suspect the table position, a scale factor or a time \
@@ -91,23 +91,23 @@ kinds! {
          in [imu.noise]."
     ErrorTermEstimated = "W12" "error-term-estimated" Note:
         "The recording shows a significant error term, so turncal estimated it together with K, E and D. The values \
-         are valid only together with this term: `turncal apply` removes it, while export formats without error \
-         terms leave it in and report this. To switch it off, list the terms that you want with --with."
+         are valid only together with this term: `turncal apply` corrects it; export formats without error terms leave \
+         its error in and say so. To leave the term out, list the terms that you want with --with."
     Settling = "W15" "settling" Note:
-        "After stops, the attitude differs from the reading of the table by an angle that fades within seconds. turncal \
-         estimated its usual size, and σ include it. Wait longer after each stop, or state settling_sigma_arcsec in \
-         [turntable]."
+        "After stops, the attitude differs from the reading of the table by an angle that fades within seconds. \
+         turncal estimated the usual size of this angle, and σ include it. Wait longer after each stop, or state \
+         settling_sigma_arcsec in [turntable]."
     PositionWrong = "W16" "position-wrong" Care:
-        "The table attitude in one dwell contradicts the gyros and accelerometers. Its readings have next to no weight; \
-         the rest is used. Check the table log for a missed step, a wrong label or a bump at \
+        "The table attitude in one dwell contradicts the gyros and accelerometers. turncal gave the readings of this \
+         dwell next to no weight and used the rest. Check the table log for a missed step, a wrong label or a bump at \
          that time."
     MoveWrong = "W17" "move-wrong" Care:
         "In one move the integrated gyro angle differs from the change of attitude. turncal estimated the \
          difference. Check that move for lost samples, a rate beyond the gyro range, or a mount that slipped."
     BiasStep = "W18" "bias-step" Care:
-        "A bias changed permanently between two dwells. turncal estimated the step; the calibration contains the \
-         mean of the bias before and after it. Look for a shock or a change of supply voltage or temperature at that \
-         time, and repeat the recording if the bias matters."
+        "A bias changed permanently between two dwells. turncal estimated the step; the calibration contains the mean \
+         bias over the recording. Look for a shock or a change of supply voltage or temperature at that time, and \
+         repeat the recording if the bias matters."
     EarthRateWrong = "W19" "earth-rate-wrong" Care:
         "In all attitudes, the gyros sense an Earth rate that does not match the stated latitude. turncal estimated \
          the difference. Check latitude_deg (first its sign) and the north and level of the table."
@@ -115,8 +115,8 @@ kinds! {
         "Some parameters are many prior σ away from [imu.prior]. Either run.toml contains a wrong unit, scale, sign \
          or axis order, or the prior σ are too small for this instrument. The finding lists likely causes."
     FormRejected = "W21" "form-rejected" Care:
-        "The data need more angles than the chosen installation form has. Values in this form are wrong by more than \
-         their σ. Rerun with --installation general."
+        "The data need more angles than the chosen misalignment form has. The values in this form are therefore wrong \
+         by more than their σ. Rerun with --installation general."
     Rounded = "W22" "rounded" Care:
         "The log rounds values more coarsely than their noise, so averaging cannot recover the mean within a step. σ \
          include this error. Log more digits or raw counts."
@@ -132,35 +132,35 @@ kinds! {
          included it in σ. Usual causes are bias changes at switch-on, remounting, and a temperature sensor away \
          from the inertial sensors."
     LabelsContradicted = "W27" "labels-contradicted" Care:
-        "The labels of some sections contradict gravity or the gyros. The finding names them and says whether \
-         turncal used the section. Correct the labels in the [segments] file."
+        "The labels of some sections contradict gravity or the gyros. The finding names these sections and says \
+         whether turncal used them. Correct the labels in the [segments] file."
     SectionsLost = "W28" "sections-lost" Care:
-        "A labelled section was skipped because too many rows are missing. Record it again, or remove it from \
-         [segments]."
+        "turncal skipped a labelled section because rows are missing there. Record the section again, or remove it \
+         from [segments]."
     ResidualsLarge = "W29" "residuals-large" Care:
         "The closed form leaves residuals that stated noise and table errors do not explain. turncal widened all σ by \
          √(χ²/ν), the Birge ratio. The finding names the interval with the largest residual: look there for a bump, a \
          wrong label or a wrong attitude. Otherwise check the noise figures, drifts of bias or scale factors, and the \
          level and north of the table."
     StatementDoubted = "W30" "statement-doubted" Care:
-        "Some data in run.toml contradict the log: for example, gravity far from normal gravity at the site, a \
-         constant or duplicate column, or a table log from a different time or clock. Each of these can change the \
-         result by more than its σ. Correct the field or log that the finding names."
+        "run.toml contradicts the log: for example, gravity is far from normal gravity at the site, a column is \
+         constant or named twice, or the table log has a different time or clock. Each of these can change the result \
+         by more than its σ. Correct the field or log that the finding names."
     PriorContradicted = "W31" "prior-contradicted" Failed:
         "A scale factor differs from the stated one by more than 10 prior σ and more than 10 %, or by more than 41 \
          %. The estimate may result from a wrong turn angle or unit. Correct scale, unit or sample_period_s in \
          [imu], or widen scale_sigma_ppm if the sensor really differs that much."
     VelocityWrong = "W32" "velocity-wrong" Care:
-        "In one move the accelerometers missed a velocity that is far larger than in other moves. turncal estimated it. \
-         Check that move for lost samples, a force beyond the range, or a bump."
+        "In one move the accelerometers missed a velocity far larger than in other moves. turncal estimated this \
+         velocity. Check that move for lost samples, a force beyond the range, or a bump."
     Slipped = "W33" "slipped" Care:
-        "From one dwell on, all attitudes are turned by one angle: the instrument slipped on the table, or the table on the \
-         ground. turncal estimated the angle, so that scale factors and biases are hardly less accurate; the \
-         misalignments hold for the mounting before the slip. Fasten the mount and repeat the recording."
+        "From one dwell on, all attitudes are turned by one angle: the instrument slipped on the table, or the table \
+         on the ground. turncal estimated the angle, so scale factors and biases are hardly less accurate; the \
+         misalignments refer to the mounting before the slip. Fasten the mount and repeat the recording."
     TermNotShown = "W34" "term-not-shown" Note:
-        "An error term that instruments of this class may have cannot be seen in this recording, and K, E or D depend on \
-         it. σ include its usual size. Add the moves that the finding names, or state that the instrument does not have it: \
-         sigma = 0 in [imu.terms]. `--with none` leaves out all terms."
+        "This recording cannot show an error term that instruments of this class may have, and K, E or D depend on the \
+         term. σ include its usual size. Add the moves that the finding names, or state that the instrument does not \
+         have the term: sigma = 0 in [imu.terms]. `--with none` leaves out all terms."
 }
 
 impl Kind {

@@ -22,12 +22,12 @@ pub struct Finding {
     pub code: String,
     /// The name of its kind, such as `not-observed`.
     pub kind: String,
-    /// Its severity, if it differs from that of its kind.
+    /// Severity, if it differs from that of its kind.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     level: Option<Level>,
-    /// Its text.
+    /// Text.
     pub text: String,
-    /// Its figures by name.
+    /// Figures by name.
     #[serde(default)]
     pub figures: Value,
 }
@@ -65,7 +65,7 @@ impl Finding {
         }
     }
 
-    /// The same with another severity than that of its kind.
+    /// A copy with another severity than that of its kind.
     pub fn at(self, level: Level) -> Self {
         Self {
             level: Some(level),
@@ -73,7 +73,7 @@ impl Finding {
         }
     }
 
-    /// Its severity. Unknown kinds, from another version, have the level of care.
+    /// Severity. Unknown kinds, from another version, have the level of care.
     pub fn level(&self) -> Level {
         let of_kind = || Kind::named(&self.kind).map_or(Level::Care, Kind::level);
         self.level.unwrap_or_else(of_kind)

@@ -19,7 +19,7 @@ pub enum Word {
     /// Some of the requested parameters are not determined; the others are usable.
     #[serde(rename = "partial")]
     Partial,
-    /// Its values must not be used.
+    /// Values must not be used.
     #[serde(rename = "failed")]
     Failed,
     /// Every limit of a specification is met.

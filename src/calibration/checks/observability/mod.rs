@@ -45,7 +45,7 @@ pub struct Observability {
 pub struct Direction {
     /// Posterior over prior σ of the combination, from 0 (known) to 1 (not observed).
     pub remaining: f64,
-    /// A description such as `gyro scale z with gyro bias z` or `gyro installation xy against gyro installation yx`:
+    /// A description such as `gyro scale z with gyro bias z` or `gyro misalignment xy against gyro misalignment yx`:
     /// `with` for the same sign, `against` for the opposite sign of parameters and of the initial attitude that is
     /// correlated with them.
     pub words: String,
@@ -175,7 +175,9 @@ fn direction(
             true => " against ",
             false => " with ",
         };
-        words += &name.replace('.', " ");
+        words += &name
+            .replace('.', " ")
+            .replace("installation", "misalignment");
     }
     if rest > NAMED {
         words += " and others";

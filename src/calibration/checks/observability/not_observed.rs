@@ -45,7 +45,7 @@ fn unseen_temperature(outcome: &Outcome) -> Vec<String> {
 pub fn not_observed(by: &str, parameters: Vec<String>) -> Option<Finding> {
     let text = format!(
         "Not determined by {by} (σ is still more than half of the prior): {}. Add positions or turns that excite \
-         them, or state a smaller σ in [imu.prior].",
+         these parameters, or state a smaller σ in [imu.prior].",
         listed(&parameters)
     );
     let figures = json!({ "by": by, "parameters": parameters });
@@ -56,7 +56,7 @@ pub fn not_observed(by: &str, parameters: Vec<String>) -> Option<Finding> {
 pub fn temperature_not_seen(parameters: Vec<String>) -> Option<Finding> {
     let text = format!(
         "The temperature dependence of these parameters is unknown: {}. Their σ are valid only at the recorded \
-         temperatures. Record turns at more temperatures to determine it.",
+         temperatures. Record turns at more temperatures to determine this dependence.",
         listed(&parameters)
     );
     let figures = json!({ "parameters": parameters });
@@ -66,8 +66,8 @@ pub fn temperature_not_seen(parameters: Vec<String>) -> Option<Finding> {
 /// The finding on unobserved combinations of parameters that are observed individually, if any.
 fn combinations(combinations: Vec<String>) -> Option<Finding> {
     let text = format!(
-        "Not determined by this path, although each parameter alone is: {}. Add positions or turns that separate \
-         them.",
+        "This path determines each of these parameters, but not their combination: {}. Add positions or turns that \
+         separate the parameters.",
         combinations.join("; ")
     );
     let figures = json!({ "combinations": combinations });
@@ -77,11 +77,17 @@ fn combinations(combinations: Vec<String>) -> Option<Finding> {
 
 /// The finding on the heading, with its 1σ after the run, rad.
 fn heading(sigma_rad: f64) -> Finding {
+    let sigma_deg = sigma_rad / DEGREE;
+    // A larger σ is that of a uniform angle, which says nothing.
+    let known = if sigma_deg < 90.0 {
+        format!(" (σ = {sigma_deg:.1}°)")
+    } else {
+        String::new()
+    };
     let text = format!(
-        "Heading could not be determined (σ = {:.1}°): the gyros are too noisy to sense Earth rate, or their biases \
-         mask it. The other parameters were still estimated. If you need the heading, log a turntable or make the \
-         dwells longer.",
-        sigma_rad / DEGREE
+        "Heading could not be determined{known}: the gyros are too noisy to sense Earth rate, or their biases mask \
+         it. The other parameters were estimated nevertheless. If you need the heading, log a turntable or make the \
+         dwells longer."
     );
     let figures = json!({ "sigma_rad": sigma_rad });
     Finding::new(Kind::HeadingNotObserved, text, figures)
@@ -102,7 +108,13 @@ fn listed(names: &[String]) -> String {
         Some((group, _)) => {
             let axes = names.iter().filter_map(|name| name.rsplit('.').next());
             let axes: Vec<&str> = axes.collect();
-            format!("{} {}", group.replace('.', " "), axes.join(", "))
+            format!(
+                "{} {}",
+                group
+                    .replace('.', " ")
+                    .replace("installation", "misalignment"),
+                axes.join(", ")
+            )
         }
         None => names.join(", "),
     };

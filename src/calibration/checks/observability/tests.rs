@@ -52,7 +52,7 @@ fn what_only_a_sum_shows_is_unobserved_as_a_difference() {
     assert_eq!(
         words,
         [
-            "gyro installation xy against gyro installation yx",
+            "gyro misalignment xy against gyro misalignment yx",
             "gyro scale x with heading"
         ]
     );

@@ -21,7 +21,7 @@ use crate::imu::{AXES, BodyFrame, InstallationForm, Nominal, PerSensor, Sensor, 
 /// A record with its name in messages.
 #[derive(Debug, Clone, Copy)]
 pub struct Named<'a> {
-    /// Its name.
+    /// Name.
     pub name: &'a str,
     /// The calibration, or the truth.
     pub record: &'a Calibration,

@@ -168,7 +168,7 @@ fn add_turn(equations: &mut Equations, turn: &Move, order: &AxisOrder) {
     equations.add(&Rows::new(partials, off, turn.variance));
 }
 
-/// Up before a move against up after it, carried back by the gyros.
+/// Up before a move compared with up after it, rotated back by the gyro angles.
 fn add_carried(
     equations: &mut Equations,
     (turned, variance): (&Turned, f64),

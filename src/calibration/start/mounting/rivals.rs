@@ -177,7 +177,7 @@ fn factors(log_likelihood: impl Fn(f64) -> f64) -> Vec<(f64, f64)> {
     tried
 }
 
-/// The run if the sensitivity of these gyros is `factor` times the stated one.
+/// Copy of the run with the sensitivity of these gyros multiplied by `factor`.
 fn less_sensitive(run: &Run, axes: Axes, factor: f64) -> Run {
     let mut run = run.clone();
     let by = Vector3::from_fn(|axis, _| match axes {

@@ -43,7 +43,7 @@ impl fmt::Display for Mounting {
         if !self.others.is_empty() {
             write!(
                 f,
-                "\nThis recording cannot separate it from\n  {}",
+                "\nThis recording cannot separate these axes from\n  {}",
                 self.others.join("\n  ")
             )?;
         }
@@ -53,8 +53,8 @@ impl fmt::Display for Mounting {
         for sensor in &self.prior_differs {
             write!(
                 f,
-                "\n[imu.prior.{}] refers to the columns in the new order and sign. If its scale and bias are those \
-                 of the columns, rearrange them as well.",
+                "\n[imu.prior.{}] refers to the columns in the new order and sign. If scale and bias are those of the \
+                 columns, rearrange them as well.",
                 sensor.name()
             )?;
         }

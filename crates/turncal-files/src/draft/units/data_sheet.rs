@@ -18,7 +18,7 @@ const PER_DEGREE: [f64; 17] = [
 pub struct Scale {
     /// The file's quantity per second for one rad/s or m/s².
     pub value: f64,
-    /// Its relative uncertainty from the recording.
+    /// Relative uncertainty from the recording.
     pub off: f64,
     pub why: String,
 }

@@ -10,6 +10,7 @@ use turncal::calibration::{
     BudgetPartRecord, BudgetRecord, FindingKind, Verdict, Word, coverage_factor,
 };
 use turncal::imu::Sensor;
+use turncal_input::counted;
 
 /// An error: content found and content expected.
 pub type Wrong = (String, String);
@@ -77,8 +78,8 @@ fn check_budget(record: &Calibration, budget: &BudgetRecord) -> Checked {
     expect!(
         found.is_none(),
         format!("{size} values in each list, one per entry of parameters"),
-        "a list of {} value(s) in budget",
-        found.unwrap_or(size)
+        "a list of {} in budget",
+        counted(found.unwrap_or(size), "value")
     );
     for (n, name) in record.parameters.iter().enumerate() {
         let squares = || budget.sources.iter().map(|part| part.u[n].powi(2));

@@ -20,7 +20,7 @@ pub trait Messages {
     /// The content of the message.
     fn data(&self) -> &[u8];
 
-    /// Its offset in the file.
+    /// Offset in the file.
     fn offset(&self) -> u64;
 }
 

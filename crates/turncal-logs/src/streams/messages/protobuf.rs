@@ -33,7 +33,7 @@ struct Field {
 }
 
 enum Kind {
-    /// Its type, and its value if it is omitted from a message.
+    /// Type, and its value if it is omitted from a message.
     Number(u64, f64),
     /// Seconds and nanoseconds.
     Time(Vec<Field>),
