@@ -13,9 +13,9 @@ use turncal_input::{Document, FileError, NonNegative};
 pub struct ThermalVariation {
     /// Per kelvin, by kind of parameter.
     first: [f64; 3],
-    /// Per kelvin squared.
+    /// Second-order coefficients, per kelvin squared.
     second: [f64; 3],
-    /// Of a bias, per K/s.
+    /// Rate coefficient of a bias, per K/s.
     rate: f64,
 }
 

@@ -99,7 +99,7 @@ pub struct Column {
     pub courses: Courses,
 }
 
-/// A column under one reading. Errors in the usual units of [`QUANTITIES`].
+/// Results for one column of the paper's table, under one interpretation of the paper. Errors in the usual units of [`QUANTITIES`].
 #[derive(Debug, Clone)]
 pub struct Row {
     /// The reading.

@@ -72,13 +72,13 @@ impl Path {
     }
 }
 
-/// RMS σ of each group's estimated parameters, rad/s or m/s² normalised; `None` if all are fixed.
+/// RMS σ of each group's estimated parameters, normalised to rad/s or m/s²; `None` if all are fixed.
 pub type GroupSigma = Vec<(Group, Option<f64>)>;
 
 /// Predicted σ, in the general misalignment form.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Expected {
-    /// RMS σ of the estimated parameters of each group, rad/s or m/s² normalised; `None` if all are fixed.
+    /// RMS σ of the estimated parameters of each group, normalised to rad/s or m/s²; `None` if all are fixed.
     pub sigma: GroupSigma,
     /// Parameters with σ above half of the prior, or determined only by the prior.
     pub unobserved: Vec<String>,

@@ -17,7 +17,7 @@ use turncal_files::Opened;
 use turncal_input::small_file;
 use turncal_report::path::{Report, in_words, moves_in_words};
 
-/// Predicts calibration accuracy for a path of a table or by hand, before any data exist
+/// Predicts calibration accuracy for a table path or for moves by hand, before any data exist
 #[derive(Debug, clap::Args)]
 #[command(arg_required_else_help = true)]
 #[command(after_help = "Example:  turncal path evaluate three-axis")]

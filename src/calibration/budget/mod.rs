@@ -66,7 +66,7 @@ impl BudgetPart {
 /// covariances that fall by ten orders of magnitude stays below that.
 const STEP: f64 = 3e-4;
 
-/// Sources that act within dwells, whose parts are differences of the chain made again.
+/// Sources that act within dwells. Each part is found by filtering the chain again with a slightly larger variance.
 const AT_REST: [BudgetSource; 9] = [
     BudgetSource::White(Sensor::Gyro),
     BudgetSource::White(Sensor::Accel),

@@ -50,10 +50,11 @@ pub struct Event {
 /// What all data say of an event.
 struct Told {
     time: f64,
-    /// Squared means of its disturbances, and their expectation with its variance.
+    /// Sum of the squared mean disturbances of the event.
     squares: f64,
+    /// Expectation of `squares` with the variance common to all events.
     known: f64,
-    /// Squared eigenvalues of that expectation, summed.
+    /// Sum of the squared eigenvalues of the covariance of the mean disturbances.
     spread: f64,
     count: f64,
     /// Change of the states.

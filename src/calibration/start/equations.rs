@@ -73,7 +73,7 @@ pub enum Common {
     Drift(Sensor, usize),
     /// A vector with unit covariance, by number.
     Unit(usize),
-    /// A vector with unit covariance, by number, that both triads have in common: an error of the table.
+    /// Number of a vector with unit covariance that both triads share: an error of the table.
     Table(usize),
 }
 

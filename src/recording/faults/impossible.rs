@@ -11,8 +11,8 @@ const FASTEST: f64 = 1000.0;
 /// Beyond the specific force of any instrument on a table, m/s² (1,000 g).
 const LARGEST_FORCE: f64 = 1e4;
 
-/// Rows beyond the range of any instrument by nominal scales, and rows of zeros in all columns although gravity exceeds
-/// the smallest step, in order. None of a kind if most rows are impossible, because then a unit is wrong.
+/// Rows that exceed the range of any instrument at nominal scales, and rows that are zero in all columns although
+/// gravity exceeds the smallest step, in row order. None of a kind if most rows are impossible, because then a unit is wrong.
 pub fn impossible(rows: &Rows) -> Vec<FaultyRows> {
     let count = rows.columns[0].len();
     let found = |kind, column, is: &dyn Fn(usize) -> bool| {

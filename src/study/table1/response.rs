@@ -25,8 +25,8 @@ pub fn standing(latitude: f64, duration: f64) -> Mission {
 /// Navigation errors by constant errors of the sensed rate and specific force, at evenly spaced times.
 ///
 /// At rest under constant sensor errors, the linear error model has constant coefficients: its response to each
-/// unit error, that of the bias of an ideal instrument, is computed once, and every sample is a linear combination
-/// of the responses.
+/// unit error (a unit bias of an otherwise ideal instrument) is computed once, and every sample is a linear combination
+/// of these responses.
 pub struct Response(Vec<Moment>);
 
 /// Navigation errors at one time per unit of the sensed errors of each triad.

@@ -38,7 +38,7 @@ pub struct OfLog {
     /// Sensor whose data sheet gives noise and tolerances: a name from turncal list, such as bmi088, or a TOML file
     #[arg(long, value_name = "NAME")]
     sensor: Option<String>,
-    /// Kalibr imu.yaml with noise figures and (without --rate) rows per second
+    /// Kalibr imu.yaml that gives the noise figures and, unless --rate is given, the row rate
     #[arg(long, value_name = "YAML")]
     noise_file: Option<PathBuf>,
     /// Stream of the instrument [default: the one with the most samples]

@@ -18,7 +18,7 @@ use turncal_report::conversion;
 
 Units (also in the form deg/sqrt(h), ug/sqrt(Hz), m/s^2):\n{}", known()))]
 pub struct Noise {
-    /// The figure
+    /// Noise figure to convert
     #[arg(value_name = "VALUE", allow_negative_numbers = true, value_parser = positive)]
     value: f64,
     /// Unit, or the name of the figure in a program

@@ -75,7 +75,7 @@ const SENTENCES: [(Kind, &str); 29] = [
     ),
     (
         Rounded,
-        "The output of the instrument is rounded more coarsely than its noise; U includes the effect.",
+        "The output of the instrument is rounded to steps larger than its noise; U includes the effect.",
     ),
     (
         EvenTermsInseparable,

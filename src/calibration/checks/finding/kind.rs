@@ -151,8 +151,8 @@ kinds! {
          %. The estimate may result from a wrong turn angle or unit. Correct scale, unit or sample_period_s in \
          [imu], or widen scale_sigma_ppm if the sensor really differs that much."
     VelocityWrong = "W32" "velocity-wrong" Care:
-        "In one move the accelerometers missed a velocity far larger than in other moves. turncal estimated this \
-         velocity. Check that move for lost samples, a force beyond the range, or a bump."
+        "In one move the velocity change from the accelerometers is wrong by far more than in other moves. turncal \
+         estimated the error. Check that move for lost samples, a force beyond the range, or a bump."
     Slipped = "W33" "slipped" Care:
         "From one dwell on, all attitudes are turned by one angle: the instrument slipped on the table, or the table \
          on the ground. turncal estimated the angle, so scale factors and biases are hardly less accurate; the \

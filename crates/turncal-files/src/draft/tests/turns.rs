@@ -109,7 +109,7 @@ fn without_a_time_turns_tell_the_unit_that_has_a_usual_rate() {
         &text,
         &[
             why,
-            "# no column increases like a time; the sample period is estimated from the turns",
+            "# no column rises steadily, as times do; the sample period is estimated from the turns",
         ],
     );
     let rate = text.split(why).nth(1).unwrap().split(' ').next().unwrap();

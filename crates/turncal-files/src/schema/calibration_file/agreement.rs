@@ -97,7 +97,9 @@ fn check_budget(record: &Calibration, budget: &BudgetRecord) -> Checked {
         );
         expect!(
             is_near(of_parts, stated, BUDGET),
-            format!("{of_parts:.6}, from those of budget.sources (Welch and Satterthwaite)"),
+            format!(
+                "{of_parts:.6}, from the degrees of freedom in budget.sources (Welch and Satterthwaite)"
+            ),
             "budget.degrees_of_freedom of {name} = {stated}"
         );
         let (k, expected) = (budget.coverage_factor[n], coverage_factor(stated));

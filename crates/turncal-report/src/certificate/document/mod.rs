@@ -323,7 +323,7 @@ fn found(as_found: &AsFound) -> Table {
     let columns = columns("parameter | as found ± U | as left ± U | change ± U | unit | change/U");
     Table::new("As found and as left", columns).section(rows).note(format!(
         "As found: parameters from {}, valid when the item was received; as left: parameters from this calibration, in \
-         the general installation form. U of a change: root of the sum of the squares of both U. A change beyond its U \
+         the general installation form. U of a change: root sum of squares of the two U. A change beyond its U \
          shows that the item has drifted. Body frame of both: {}.",
         as_found.earlier,
         as_found.body_frame.words()
