@@ -168,7 +168,7 @@ impl Site {
         site
     }
 
-    /// The same site with a measured gravity and its 1σ, m/s².
+    /// A copy of the site with a measured gravity and its 1σ, m/s².
     pub fn with_gravity(self, gravity: f64, sigma: f64) -> Self {
         Self {
             gravity,

@@ -49,7 +49,7 @@ pub struct MotionNoise {
 }
 
 impl MotionNoise {
-    /// That of turning by hand: 0.05° (1σ) in a quarter turn of 1.5 s, the size that records of MEMS sensors turned by
+    /// Noise of moves by hand: 0.05° (1σ) in a quarter turn of 1.5 s, the size that records of MEMS sensors turned by
     /// hand show (bandwidth, timing and second-order effects of the sensor).
     pub const BY_HAND: Self = Self {
         by_motion: 7e-4,

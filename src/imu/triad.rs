@@ -117,7 +117,7 @@ impl Triad {
             .map(|(angle, _)| INSTALLATION + angle)
     }
 
-    /// The same without misalignment angles above the diagonal of `C`.
+    /// A copy without misalignment angles above the diagonal of `C`.
     pub fn along_body_axes(&self) -> Self {
         let mut v = self.to_vector();
         for angle in Self::above_the_diagonal(self.form) {

@@ -149,7 +149,7 @@ impl Lot {
     }
 }
 
-/// What all records are converted to.
+/// Units and nominal scales to which all records are converted.
 struct Common {
     /// The output of most records; the first of several equally common ones.
     output: Option<PerSensor<String>>,

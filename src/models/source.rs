@@ -149,7 +149,7 @@ impl Text {
     }
 }
 
-/// The same for a named file.
+/// Inconsistent values in a named file: problem and remedy.
 pub fn inconsistent(file: &str, message: impl Into<String>) -> ModelError {
     let error = FileError {
         file: file.into(),

@@ -11,11 +11,11 @@ use turncal_input::{Document, FileError, NonNegative};
 /// 1σ, over the instruments of a grade, of the temperature dependence of each parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ThermalVariation {
-    /// Per kelvin, by kind of parameter.
+    /// Linear change per kelvin, by kind of parameter.
     first: [f64; 3],
-    /// Per kelvin squared.
+    /// Quadratic change per kelvin squared.
     second: [f64; 3],
-    /// Of a bias, per K/s.
+    /// Change of a bias per K/s.
     rate: f64,
 }
 

@@ -200,7 +200,7 @@ pub enum ConversionError {
         /// As given.
         unit: String,
     },
-    /// A figure per sample needs the sample rate.
+    /// A figure per sample without the sample rate.
     #[error(
         "`{unit}` is noise per sample, which needs the sample rate: add --rate with the rate in Hz"
     )]

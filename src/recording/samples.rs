@@ -11,9 +11,9 @@ use crate::imu::{PerSensor, Sensor};
 /// The samples of both triads, at one period, in one stretch or several.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ImuSamples {
-    /// Length of every sample, s …
+    /// Length of every sample, s.
     pub period: f64,
-    /// … and its relative 1σ; zero if a clock determines it.
+    /// Relative 1σ of the sample length; zero if a clock determines it.
     pub period_sigma: f64,
     /// Stretches of consecutive samples, in order; at least one. Between two stretches at least one sample is
     /// lost.

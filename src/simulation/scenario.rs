@@ -118,7 +118,7 @@ impl Scenario {
         Ok(scenario)
     }
 
-    /// The same scenario with a different path, given by embedded name or file.
+    /// A copy with a different path, given by embedded name or file.
     ///
     /// # Errors
     /// If it does not exist, is malformed, or does not fit the table.
@@ -128,7 +128,7 @@ impl Scenario {
         along.map_err(|message| models::inconsistent(name_or_path, message))
     }
 
-    /// The same scenario along a path of this name.
+    /// A copy along a path of this name.
     ///
     /// # Errors
     /// A message if it does not fit the table, or takes too many samples.
@@ -142,7 +142,7 @@ impl Scenario {
         Ok(scenario)
     }
 
-    /// The same scenario with an error term, of usual magnitude unless its models state one.
+    /// A copy with an error term, of usual magnitude unless its models state one.
     pub fn with_error_term(mut self, block: ErrorTerm) -> Self {
         match block {
             ErrorTerm::GaussMarkovBias => {

@@ -233,7 +233,7 @@ impl Mission {
         self.errors_from(&ErrorVector::zeros(), pair)
     }
 
-    /// The same from a start with these errors.
+    /// As [`Self::errors`], from a start with these errors.
     ///
     /// # Errors
     /// As for [`Self::navigate`].
@@ -274,7 +274,7 @@ impl Mission {
         self.exposure_from(Sensitivity::zeros(), truth)
     }
 
-    /// The same if the initial errors also depend on the parameters.
+    /// As [`Self::exposure`], if the initial errors also depend on the parameters.
     ///
     /// # Errors
     /// As for [`Self::navigate`].
@@ -303,7 +303,7 @@ impl Mission {
         Ok(exposures)
     }
 
-    /// The same step by step along a trajectory.
+    /// As [`Self::exposure`], step by step along a trajectory.
     fn exposure_moving(
         &self,
         mut sensitivity: Sensitivity,

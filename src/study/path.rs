@@ -60,7 +60,7 @@ pub struct Evaluation {
     pub navigation: Vec<Outlook>,
 }
 
-/// What a calibration would know without a move: attitude, velocity and position may have become anything in it.
+/// Accuracy of a calibration without a move, in which attitude, velocity and position may change to anything.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Without {
     /// Time of the move and the dwell after it, s.

@@ -11,7 +11,7 @@ use crate::recording::ColumnFacts;
 pub struct Rows<'a> {
     /// Gyro x, y, z and accelerometer x, y, z.
     pub columns: [Vec<f64>; 6],
-    /// What the reader found of each.
+    /// Facts that the reader found about each column.
     pub facts: &'a [ColumnFacts; 6],
     /// Full scale of each column, in the file's quantity.
     pub full_scale: [Option<f64>; 6],

@@ -16,9 +16,9 @@ pub struct Slower {
     pub line: u64,
     /// Number of samples from one row to the next.
     pub step: usize,
-    /// Number of places between rows …
+    /// Number of places between rows.
     pub places: usize,
-    /// … and of those that are bridged.
+    /// Number of these places that are bridged.
     pub bridged: usize,
 }
 

@@ -12,11 +12,11 @@ use crate::run::Run;
 use crate::run::turning::{SMALLEST, steps};
 use crate::units::DEGREE;
 
-/// A turn counts as single-axis if the integrals of the rates reach this part of the total angle …
+/// A turn counts as single-axis if the integrals of the rates reach this part of the total angle.
 const ALONG: f64 = 0.95;
-/// … and the rotation agrees with the single rotation by these integrals within this, rad …
+/// The rotation must also agree with the single rotation by these integrals within this angle, rad.
 const ONE_AXIS: f64 = 1.0 * DEGREE;
-/// … plus this part of the total angle.
+/// Part of the total angle that is added to this tolerance.
 const APART: f64 = 0.02;
 /// A turn about an axis within this angle of a body axis is assigned to that body axis.
 const NEAR_AXIS: f64 = 15.0 * DEGREE;
@@ -32,7 +32,7 @@ pub struct Turn {
     pub angle: f64,
     /// Integrals of the rates about each body axis, rad.
     pub sum: Vector3<f64>,
-    /// Whether it is about one axis throughout.
+    /// Whether the turn is about one axis throughout.
     pub single: bool,
     /// Maximum rate about any body axis, rad/s.
     pub fastest: f64,

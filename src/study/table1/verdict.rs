@@ -19,7 +19,7 @@ pub enum Verdict {
     Zero,
     /// All five means agree under another reading that a correct program may implement.
     UnderAnotherReading(&'static Reading),
-    /// They agree under no reading of a correct program; contains the mistake under which they agree, if one is
+    /// The figures agree under no reading of a correct program; contains the mistake under which they agree, if one is
     /// known.
     NotReproducible(Option<&'static Reading>),
 }
