@@ -23,7 +23,7 @@ impl AxisOrder {
         source: [1, 0, 2],
         reversed: [false, false, true],
     };
-    /// From front, left, up.
+    /// From front, left, up to right, front, up.
     pub const FRONT_LEFT_UP: Self = Self {
         source: [1, 0, 2],
         reversed: [true, false, false],

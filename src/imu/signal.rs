@@ -65,8 +65,8 @@ impl GaussMarkov {
 }
 
 impl Noise {
-    /// Covariance, on one axis, of the mean outputs over two time spans (start and end, s): (rad/s)² or (m/s²)².
-    /// For two equal spans it is the variance of the mean.
+    /// Covariance, on one axis, of the mean outputs over two time spans (start and end, s): (rad/s)² or (m/s²)². For
+    /// two equal spans, the covariance is the variance of the mean.
     ///
     /// Random walk is common to both where they overlap; the Gauss–Markov bias is the double integral of
     /// its autocovariance `σ² exp(−|t|/τ)` over both.

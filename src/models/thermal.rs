@@ -49,7 +49,7 @@ const MINUTE: f64 = 60.0;
 /// `[gyro.temperature]` or `[accel.temperature]` in an instrument file: 1σ of each, zero if not stated.
 pub type ThermalFile = BTreeMap<String, NonNegative>;
 
-/// Scale for 1 K and 1 K² in ppm, installation for 1 K in arc seconds, and bias for 1 K, 1 K² and 1 K/min in °/h or µg.
+/// Scale for 1 K and 1 K² in ppm, misalignment for 1 K in arc seconds, and bias for 1 K, 1 K² and 1 K/min in °/h or µg.
 pub fn thermal_variation(
     document: Document,
     sensor: Sensor,

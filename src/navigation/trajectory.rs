@@ -22,7 +22,7 @@ const LEAST_ROUND: f64 = 1.0;
 
 /// A start and segments, which repeat.
 ///
-/// The body points along its velocity: heading is that of the velocity, pitch its angle above the horizon.
+/// The body points along its velocity: heading is the direction of the velocity, pitch its angle above the horizon.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Trajectory {
     start: Start,

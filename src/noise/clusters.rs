@@ -1,11 +1,10 @@
 //! The cluster times of a recording, and the covariance of Allan variances at them under a mixture of processes.
 //!
-//! An overlapping Allan variance is a mean of squared second differences `D`; for Gaussian noise
-//! `cov(⟨D₁²⟩, ⟨D₂²⟩) = 2 Σ cov(D₁, D₂)²` over all pairs of places. With strengths squared `c_p` that is
-//! quadratic in c, so one table for each pair of processes serves every mixture. Source: Greenhall,
-//! Riley, *Uncertainty of Stability Variances Based on Finite Differences*, PTTI 2003, which does so for
-//! one process and one cluster time: their equivalent degrees of freedom (NIST SP 1065, 5.4.1) are
-//! `2 σ⁴ / var σ²`.
+//! An overlapping Allan variance is a mean of squared second differences `D`; for Gaussian noise `cov(⟨D₁²⟩, ⟨D₂²⟩) = 2
+//! Σ cov(D₁, D₂)²` over all pairs of places. With strengths squared `c_p` that is quadratic in c, so one table for each
+//! pair of processes serves every mixture. Source: Greenhall, Riley, *Uncertainty of Stability Variances Based on
+//! Finite Differences*, PTTI 2003, for one process and one cluster time: their equivalent degrees of freedom (NIST SP
+//! 1065, 5.4.1) are `2 σ⁴ / var σ²`.
 
 use std::collections::BTreeMap;
 

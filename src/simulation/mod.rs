@@ -139,8 +139,8 @@ impl Scenario {
         self.simulate_recording(seed, stream, stream, &Difference::default())
     }
 
-    /// The same for the instrument of one stream with all other random numbers from another, as for one of its
-    /// recordings, with parameter differences `own`.
+    /// Simulates one recording of the instrument of one stream, with all other random numbers from another stream and
+    /// with parameter differences `own`.
     ///
     /// # Errors
     /// If the table cannot follow the path.

@@ -32,7 +32,7 @@ pub struct Scenario {
     pub site: Site,
     /// The grade of instrument.
     pub instrument: Instrument,
-    /// Installation.
+    /// Misalignment form, with the distribution of its angles.
     pub installation: InstallationModel,
     /// The true body frame: in the accelerometer frame, the misalignment angles that it
     /// fixes are not drawn.
@@ -176,7 +176,7 @@ impl Scenario {
         self
     }
 
-    /// Whether its runs include an error term.
+    /// Whether the runs of the scenario include an error term.
     pub fn has(&self, block: ErrorTerm) -> bool {
         let sees_table = self.body_frame == BodyFrame::Table;
         let errors = &self.table.errors;
@@ -215,7 +215,7 @@ impl Scenario {
         Ok(self.motion()?.duration())
     }
 
-    /// Total time of the dwells in it, s.
+    /// Total time of the dwells in a run, s.
     ///
     /// # Errors
     /// If the table cannot follow the path.

@@ -57,7 +57,7 @@ impl Opened {
         Ok(opened)
     }
 
-    /// The same for files in memory: a `run.toml` or a log, which may name the others.
+    /// As [`Self::new`] for files in memory: a `run.toml` or a log, which may name the others.
     ///
     /// # Errors
     /// As for [`Self::new`].

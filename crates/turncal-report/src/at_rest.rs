@@ -32,7 +32,7 @@ pub fn document(at_rest: &AtRest, run: &Run, calibration: &Calibration) -> Docum
     document
 }
 
-/// What the polynomials leave, separately for heating and cooling.
+/// Residuals of the polynomials, separately for heating and cooling.
 fn residuals(at_rest: &AtRest) -> Plot {
     let form = at_rest.outputs.form();
     let panel = |(bias, means): &(usize, Vec<MeanAtRest>)| {

@@ -91,7 +91,7 @@ impl Sizes {
         self.events.iter().map(|(&event, &factor)| (event, factor))
     }
 
-    /// A copy with every effect as the links were made.
+    /// A copy in which every effect has the size with which the links were made.
     pub fn of_events_alone(&self) -> Self {
         Self {
             effects: BTreeMap::new(),

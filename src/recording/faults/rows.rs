@@ -27,7 +27,7 @@ pub struct Rows<'a> {
     pub numbers: Vec<usize>,
     /// Sample period, s.
     pub period: f64,
-    /// Rows before each duplicate, and its line.
+    /// Number of rows before each duplicate, and the line of the duplicate.
     pub duplicates: Vec<(usize, u64)>,
 }
 
@@ -44,7 +44,7 @@ pub struct FaultyRows {
 }
 
 impl FaultyRows {
-    /// The columns that it concerns.
+    /// The columns that the fault concerns.
     pub fn columns(&self) -> Range<usize> {
         self.column.map_or(0..6, |column| column..column + 1)
     }

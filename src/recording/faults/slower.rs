@@ -12,7 +12,7 @@ use crate::recording::ImuSamples;
 pub struct Slower {
     /// From the first sample without a row to the last.
     pub samples: Range<usize>,
-    /// Line of the row before them.
+    /// Line of the row before these samples.
     pub line: u64,
     /// Number of samples from one row to the next.
     pub step: usize,

@@ -43,7 +43,7 @@ const BIAS_SIGMAS: f64 = 6.0;
 struct Slide {
     /// Samples per window.
     length: usize,
-    /// Samples from one to the next.
+    /// Samples from one window to the next.
     step: usize,
 }
 
@@ -52,7 +52,7 @@ struct Windows {
     slide: Slide,
     /// NaN if samples are missing, so that the window does not count as at rest or steady.
     means: Vec<Vector3<f64>>,
-    /// 1σ per axis of their noise.
+    /// 1σ per axis of the noise of the means.
     sigma: f64,
 }
 

@@ -28,7 +28,8 @@ pub struct Turn {
     pub samples: Range<usize>,
     /// Unit vector along body axes, in their positive half.
     pub axis: Vector3<f64>,
-    /// Angle, right-handed about the axis, rad; of a turn about several axes, that of the equivalent single rotation.
+    /// Angle about the axis, right-handed, rad; for a turn about several axes, the angle of the equivalent single
+    /// rotation.
     pub angle: f64,
     /// Integrals of the rates about each body axis, rad.
     pub sum: Vector3<f64>,
@@ -36,9 +37,9 @@ pub struct Turn {
     pub single: bool,
     /// Maximum rate about any body axis, rad/s.
     pub fastest: f64,
-    /// `C` from the body axes after the turn to those before.
+    /// `C` from the body axes after the turn to the body axes before it.
     pub rotation: Matrix3<f64>,
-    /// Index of the dwell before it; the next dwell follows it.
+    /// Index of the dwell before the turn; the next dwell follows the turn.
     pub from: Option<usize>,
     /// Angle between the up direction propagated by the gyros and that of the accelerometers after the turn, rad.
     pub off_gravity: Option<f64>,
@@ -79,7 +80,7 @@ impl Turn {
         }
     }
 
-    /// The body axis of the turn, if it is about one.
+    /// The body axis of the turn, if the turn is about a body axis.
     pub fn body_axis(&self) -> Option<usize> {
         let axis = self.axis.iamax();
         (self.single && self.axis[axis] > NEAR_AXIS.cos()).then_some(axis)

@@ -44,7 +44,7 @@ impl With {
         all.iter().all(|of| *of == Self::Auto)
     }
 
-    /// Exits with the status for wrong usage if auto or none has another value beside it.
+    /// Exits with the status for wrong usage if auto or none is combined with another value.
     pub fn check(all: &[Self]) {
         let Some(&alone) = all.iter().find(|of| of.term().is_none()) else {
             return;

@@ -177,7 +177,7 @@ pub fn deliver(
     }
 }
 
-/// It was calibrated, but what was asked of it is not met.
+/// The units were calibrated, but a requirement is not met.
 #[derive(Debug, thiserror::Error)]
 pub enum NotMet {
     /// Limits of a specification.

@@ -24,7 +24,7 @@ pub struct Init {
     /// a ROS bag, PX4 ULog, ArduPilot DataFlash, MAT, NPY or NPZ, whose streams are listed
     #[arg(value_name = "IMU.csv")]
     log: PathBuf,
-    /// The same as --accel-file
+    /// Log of the accelerometers, as with --accel-file
     #[arg(value_name = "ACCEL.csv", conflicts_with_all = ["stream", "accel_file"])]
     accel: Option<PathBuf>,
     #[command(flatten)]

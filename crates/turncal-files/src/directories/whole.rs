@@ -78,7 +78,7 @@ impl WholeDirectory {
         self.commit_with(&list)
     }
 
-    /// The same for a directory that grows: see `list_anew`.
+    /// Moves a growing directory into place: see `list_anew`.
     pub fn commit_growing(self, names: &[&str]) -> Result<(), FileError> {
         let list = manifest::of_names(names.iter().copied());
         self.commit_with(&list)
@@ -133,7 +133,7 @@ pub fn write_whole(path: &Path, bytes: &[u8], force: bool) -> Result<(), FileErr
     write_whole_with(path, force, |mut file| file.write_all(bytes))
 }
 
-/// The same for output too large for memory: `write` receives the temporary file.
+/// As [`write_whole`] for output too large for memory: `write` receives the temporary file.
 pub fn write_whole_with(
     path: &Path,
     force: bool,

@@ -47,7 +47,7 @@ pub struct Residual {
 }
 
 impl Residual {
-    /// Those of both triads that exceed rounding.
+    /// Residual errors of both triads that exceed rounding.
     pub fn all(values: &Values, program: &PerSensor<Affine>) -> Vec<Self> {
         let of = |sensor| {
             let (triad, program) = (values.triads.get(sensor), program.get(sensor));

@@ -40,15 +40,15 @@ impl Clock<'_> {
 /// Position of a row by its stamp: number of kept rows before it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stamp {
-    /// It is taken.
+    /// The row is taken, after this number of kept rows.
     New(usize),
-    /// The same stamp as the previous row.
+    /// The stamp equals that of the previous row.
     Again(usize),
 }
 
 /// A pause so long that its remainder is omitted.
 struct Pause {
-    /// Time of the row after it, with shortened pauses, s.
+    /// Time of the row after the pause, with shortened pauses, s.
     until: f64,
     /// Total shortening up to here, s.
     left_out: f64,
@@ -90,14 +90,14 @@ pub struct Stamps {
     standing: usize,
     /// Rows with the time but not the values of another, and the line of the first.
     at_once: (usize, u64),
-    /// Time in s and line of each row kept …
+    /// Time in s and line of each row kept.
     pub of_rows: Vec<(f64, u64)>,
-    /// … and number of rows before them.
+    /// Number of rows before the rows kept.
     let_go: usize,
 }
 
 impl Stamps {
-    /// The same if times must be unique.
+    /// A copy for which times must be unique.
     pub fn without_bursts(self) -> Self {
         Self {
             bursts: false,
@@ -385,7 +385,7 @@ impl Stamps {
         self.let_go += rows;
     }
 
-    /// Notes on times that step back, and on the resulting ambiguity if this number of samples lack their rows.
+    /// Notes on times that step back, and on the resulting ambiguity if the rows of this number of samples are missing.
     pub fn notes(&self, file: &Path, missing: usize) -> Vec<String> {
         let file = file.display();
         let set = self.set.iter();

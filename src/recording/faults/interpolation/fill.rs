@@ -156,7 +156,7 @@ impl Fill {
         self.sum_after(axis, 0)
     }
 
-    /// The same for a hole `shift` samples later.
+    /// The sum over a hole `shift` samples later.
     fn sum_after(&self, axis: &[f64], shift: isize) -> f64 {
         let (mut weights, mut sum) = (self.weights.as_slice(), 0.0);
         for run in &self.runs {
