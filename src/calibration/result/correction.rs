@@ -134,7 +134,7 @@ impl Correction {
         })
     }
 
-    /// A copy with a check that the record belongs to the run's instrument: units and nominal scales must agree.
+    /// The correction, with a check that the record belongs to the run's instrument: units and nominal scales must agree.
     pub fn for_run(record: &Calibration, run: &Run) -> Result<Self, CorrectionError> {
         let correction = Self::of_record(record)?;
         for sensor in Sensor::ALL {

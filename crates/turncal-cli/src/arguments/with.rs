@@ -10,11 +10,11 @@ use turncal::calibration::ErrorTerm;
 /// A value of `--with`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum With {
-    /// Every error term, averaged over being absent and its usual sizes.
+    /// Every error term, averaged over its absence and its usual sizes.
     Auto,
     /// K, E and D alone.
     None,
-    /// This term, whatever the data say.
+    /// This term, in any case.
     Term(ErrorTerm),
 }
 

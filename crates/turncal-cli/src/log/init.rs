@@ -10,8 +10,8 @@ use turncal_logs::DataFile;
 
 /// Writes a draft of run.toml for a log without one
 ///
-/// Identifies the columns by name or value, the time unit, the sensor units (from gravity at rest and its rotation with
-/// the gyros), and the white noise at rest, and gives a reason for each guess. Fields that the log cannot show are
+/// Identifies the columns by name or value, the time unit, the sensor units (from gravity at rest and its change when
+/// the gyros turn), and the white noise at rest, and gives a reason for each guess. Fields that the log cannot show are
 /// marked TODO.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:

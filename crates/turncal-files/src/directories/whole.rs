@@ -55,7 +55,8 @@ impl WholeDirectory {
                     format!("{} in it", held.display())
                 };
                 let expected = "a directory that can be replaced";
-                let advice = "Choose another name; replacing this one would delete files that are still needed.";
+                let advice = "Choose another name, because replacing this directory would delete files that are still \
+                    needed.";
                 return Err(FileError::of(target, found, expected, advice));
             }
             only_output(target)?;
@@ -123,7 +124,8 @@ fn only_output(directory: &Path) -> Result<(), FileError> {
         let (name, list) = (foreign.display(), manifest::FILE);
         let found = format!("`{name}` in it, which turncal's list of its own files (`{list}`) does not name");
         let expected = "a directory with only files that turncal wrote";
-        let advice = "Move it elsewhere or choose another name, because replacing the directory would delete it.";
+        let advice = "Move this file elsewhere or choose another name, because replacing the directory would delete \
+            the file.";
         Err(FileError::of(directory, found, expected, advice))
     })
 }

@@ -133,7 +133,7 @@ impl Stamps {
             return Err(csv.error_here(
                 "the same time as in the previous row, but other values",
                 "a later time",
-                "Remove the wrong row of the two, or log the time with more digits.",
+                "Remove the wrong one of the two rows, or log the time with more digits.",
             ));
         }
         if self.is_set_to(place, csv)? {
@@ -422,8 +422,8 @@ impl Stamps {
             )),
             TimeUnit::Count => (missing > 0).then(|| {
                 format!(
-                    "Rows are missing, and the counter wraps every {} samples ({} s). Each gap may be longer by one \
-                        or more of these periods, and all later times too early by as much. Use a time that does not \
+                    "Rows are missing, and the counter wraps every {} samples ({} s). Each gap may be longer by one or \
+                        more of these periods; all later times are then too early by as much. Use a time that does not \
                         wrap, or split the recording at the gaps.",
                     (size / self.period()).round(),
                     nanoseconds(size)

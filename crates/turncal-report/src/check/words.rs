@@ -146,9 +146,14 @@ fn of_motion(survey: &Survey) -> Vec<String> {
         .map(|(way, _)| way_up(way / 2, way % 2 == 1))
         .collect();
     if !missing.is_empty() && survey.directions < DIRECTIONS {
+        let positions = if missing.len() == 1 {
+            "Missing position"
+        } else {
+            "Missing positions"
+        };
         findings.push(format!(
-            "Of the six positions, {} are missing, and only {} upward directions differ by {}° or more. Without a \
-             table, the nine accelerometer parameters need all six positions or {DIRECTIONS} directions.",
+            "{positions}: {}. Only {} upward directions differ by {}° or more; without a table, the nine accelerometer \
+             parameters need all six positions or {DIRECTIONS} directions.",
             missing.join(", "),
             survey.directions,
             degrees(APART)

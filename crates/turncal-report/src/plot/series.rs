@@ -150,7 +150,7 @@ impl Series {
         Self::whiskers(mark, points.into_iter().map(|at| (at, (at.1, at.1))))
     }
 
-    /// A copy with an interval at each point.
+    /// Marks with an interval at each point.
     pub fn whiskers(mark: Mark, points: impl IntoIterator<Item = (Point, (f64, f64))>) -> Self {
         Self::new(Shape::Marks(mark, points.into_iter().collect()))
     }

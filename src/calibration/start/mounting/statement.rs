@@ -48,7 +48,7 @@ impl fmt::Display for Mounting {
             )?;
         }
         if self.or_latitude {
-            f.write_str("\nA latitude of opposite sign would explain the data equally well.")?;
+            f.write_str("\nA latitude of the opposite sign would explain the data equally well.")?;
         }
         for sensor in &self.prior_differs {
             write!(
