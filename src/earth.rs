@@ -106,9 +106,9 @@ pub struct Site {
     pub height: f64,
     /// Magnitude of gravity in m/s², including the centrifugal part.
     pub gravity: f64,
-    /// 1σ in m/s². The scale factors of all three accelerometers share its error.
+    /// 1σ in m/s². The scale factors of all three accelerometers share the error of gravity.
     pub gravity_sigma: f64,
-    /// Whether the site is known; if not, Earth rotation is zero with the σ of [`Site::earth_rate_sigma`].
+    /// Whether the site is known; otherwise Earth rotation is zero with the σ of [`Site::earth_rate_sigma`].
     #[serde(default = "known")]
     pub is_known: bool,
 }
@@ -131,7 +131,7 @@ const FREE_AIR: f64 = 0.3086 * MILLIGAL;
 const ANYWHERE: (f64, f64) = (9.806, 0.015);
 
 impl Site {
-    /// An unknown site on the Earth. If a latitude is still needed, it is the one with mean gravity.
+    /// An unknown site on the Earth, with the latitude of mean gravity where a latitude is needed.
     pub fn unknown() -> Self {
         let (gravity, gravity_sigma) = ANYWHERE;
         Self {
@@ -168,7 +168,7 @@ impl Site {
         site
     }
 
-    /// The same site with a measured gravity and its 1σ, m/s².
+    /// A copy of the site with a measured gravity and its 1σ, m/s².
     pub fn with_gravity(self, gravity: f64, sigma: f64) -> Self {
         Self {
             gravity,
@@ -177,7 +177,7 @@ impl Site {
         }
     }
 
-    /// Gravity in East-North-Up, m/s². It points down, so a body at rest senses the negative of it.
+    /// Gravity in East-North-Up, m/s². Gravity points down, and a body at rest senses its negative.
     pub fn gravity_n(&self) -> Vector3<f64> {
         Vector3::new(0.0, 0.0, -self.gravity)
     }
@@ -191,7 +191,8 @@ impl Site {
         }
     }
 
-    /// 1σ of each component of Earth rotation, rad/s: if the site is unknown, its direction is arbitrary.
+    /// 1σ of each component of Earth rotation, rad/s: if the site is unknown, the direction of the rotation is
+    /// arbitrary.
     pub fn earth_rate_sigma(&self) -> f64 {
         if self.is_known {
             0.0

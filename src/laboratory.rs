@@ -1,4 +1,4 @@
-//! Statements of a calibration laboratory about itself, its customer and the item, which do not follow from data. A
+//! Statements of a calibration laboratory about itself, its customer and the item. They do not follow from data; a
 //! certificate shows them.
 
 use serde::Deserialize;
@@ -81,7 +81,7 @@ impl std::fmt::Display for Day {
 pub enum Place {
     /// In the laboratory.
     Laboratory,
-    /// At the customer's.
+    /// At the customer's site.
     Customer,
     /// In a branch of the laboratory.
     LaboratoryBranch,

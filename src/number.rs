@@ -78,7 +78,7 @@ pub fn stated(x: f64) -> String {
     plain(to_twelve_digits(x))
 }
 
-/// The same for three axes; one number if all are equal.
+/// Stated values of three axes; one number if all are equal.
 pub fn stated_axes(of: [f64; 3]) -> String {
     let mut all = of.map(stated).to_vec();
     all.dedup();

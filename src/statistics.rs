@@ -18,7 +18,7 @@ pub fn chi_square_limit(degrees: f64, chance: f64) -> f64 {
     ChiSquared::new(degrees).map_or(f64::INFINITY, |chi2| chi2.inverse_cdf(1.0 - chance))
 }
 
-/// ln of the probability that χ² with these degrees of freedom exceeds `x`, accurate even if it is tiny.
+/// ln of the probability that χ² with these degrees of freedom exceeds `x`, accurate even if the probability is tiny.
 pub fn ln_survival(freedom: f64, x: f64) -> f64 {
     let (a, z) = (0.5 * freedom, 0.5 * x);
     if z < a + 1.0 {

@@ -53,7 +53,7 @@ pub fn bound(
     Ok(bound)
 }
 
-/// The same, with the 1σ of the parameters without each move in turn.
+/// The bound, and the 1σ of the parameters without each move in turn.
 ///
 /// # Errors
 /// [`CalibrationError`] as for [`super::estimate`].

@@ -38,7 +38,7 @@ pub struct Solved {
     pub converged: bool,
 }
 
-/// Iterates from a starting point with these priors of the initial attitudes.
+/// Iterates from a starting point, with these priors of the initial attitudes.
 ///
 /// # Errors
 /// [`CalibrationError`] if no pass is possible at the start. Without convergence, the result says so.
@@ -177,7 +177,7 @@ impl Filtered<'_> {
 }
 
 impl Solved {
-    /// The estimate of both triads; its covariance has no part beside that of the chain.
+    /// The estimate of both triads, with the covariance of the chain alone.
     pub fn both_triads(&self) -> Estimate {
         let linear = &self.posterior.parameter_covariance;
         Estimate::with_curvature(self.estimate.triads, linear)

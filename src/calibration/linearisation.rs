@@ -147,13 +147,13 @@ const READ_ATTITUDE: f64 = DEGREE;
 /// σ of the initial level without a table, divided by its σ from the accelerometer prior: the data that gave this level
 /// are also observations and must determine it.
 const LEVEL_SIGMAS: f64 = 10.0;
-/// 1σ of the initial heading without a table, rad, if Earth rate determines it well; otherwise …
+/// 1σ of the initial heading without a table, rad, if Earth rate determines the heading well.
 const HEADING: f64 = 15.0 * DEGREE;
-/// … this many times its σ from Earth rate.
+/// Otherwise, 1σ of the initial heading without a table, divided by its σ from Earth rate.
 const HEADING_SIGMAS: f64 = 3.0;
-/// A heading with a larger σ than this, rad, is treated as unknown: it is fixed with a σ of …
+/// A heading with a larger σ than this, rad, is treated as unknown and fixed.
 const HIDDEN: f64 = 45.0 * DEGREE;
-/// … this, rad: negligible, but a state needs a σ.
+/// σ of a fixed heading, rad: negligible, but a state needs a σ.
 const FIXED: f64 = 1e-6;
 /// 1σ of a uniformly distributed heading, rad.
 pub const UNKNOWN_HEADING: f64 = PI / 1.732_050_807_568_877_2;
@@ -228,8 +228,8 @@ pub struct Start {
     pub velocity_sigma: f64,
     /// 1σ of position, m.
     pub position_sigma: f64,
-    /// Mean of the error of Earth rate along East, North and Up, rad/s …
+    /// Mean of the error of Earth rate along East, North and Up, rad/s.
     pub earth_rate: Vector3<f64>,
-    /// … and 1σ of each.
+    /// 1σ of the error of Earth rate along East, North and Up, rad/s.
     pub earth_rate_sigma: Vector3<f64>,
 }

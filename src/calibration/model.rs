@@ -18,7 +18,7 @@ use crate::units::ARCSEC;
 
 /// Default 1σ of the level of a table, rad.
 pub const USUAL_LEVEL: f64 = 10.0 * ARCSEC;
-/// Default 1σ of its north, rad.
+/// Default 1σ of the north of a table, rad.
 pub const USUAL_NORTH: f64 = 60.0 * ARCSEC;
 /// Default 1σ of each tilt of its axes, rad.
 const USUAL_TILT: f64 = 10.0 * ARCSEC;
@@ -52,9 +52,9 @@ pub struct Model {
     pub turning_at_rest: f64,
     /// 1σ of each parameter of the instrument's error terms, around zero; zero if a term is off.
     pub term_sigma: TermVector,
-    /// Error terms that may be absent: the average over their sizes is estimated.
+    /// Error terms that may be absent; the estimate averages over their sizes.
     pub may_have: Vec<ErrorTerm>,
-    /// Whether the latitude may be another than the stated one, which only a table shows.
+    /// Whether the latitude may differ from the stated one, which only a table shows.
     pub may_be_elsewhere: bool,
     /// Temperature dependence of the instrument, if any.
     pub thermal: Option<Arc<ThermalModel>>,
@@ -66,9 +66,9 @@ pub struct Model {
     pub position_sigma: f64,
     /// 1σ per axis of a reading of the table, rad; zero without a table.
     pub reading_sigma: f64,
-    /// The same of a reading just after a stop in addition, …
+    /// 1σ per axis of the settling, an additional error of a reading just after a stop, rad.
     pub settling_sigma: f64,
-    /// … and the time in which it fades, s.
+    /// Time in which the settling fades, s.
     pub settling_time: f64,
     /// 1σ of table errors not included in its readings; zero if off.
     pub geometry: TableGeometry,

@@ -41,14 +41,13 @@ pub struct Outcome {
     /// Posterior 1σ of the initial attitude of the last stretch about East, North and Up, rad; the last is that of the
     /// heading.
     pub attitude_sigma: Vector3<f64>,
-    /// Errors of the table's geometry and parameters of the instrument's error terms, of those that are certain or asked
-    /// for.
+    /// Errors of the table's geometry and parameters of the instrument's error terms, as far as certain or requested.
     pub auxiliary: Auxiliary,
     /// Temperature dependence of the parameters, if any.
     pub thermal: Option<Thermal>,
     /// Deviation of each recording from the common parameters; empty if there is none.
     pub own: Vec<Own>,
-    /// Each recording calibrated alone, if something differs between recordings or temperatures.
+    /// Separate calibration of each recording, if recordings or temperatures differ.
     pub alone: Vec<SeparateEstimate>,
     /// Gravity and its 1σ after the run, m/s².
     pub gravity: (f64, f64),
@@ -56,7 +55,7 @@ pub struct Outcome {
     pub observability: Observability,
     /// Linearisation point of the last pass.
     pub linearised_at: Linearisation,
-    /// Each pass in order.
+    /// All passes in order.
     pub passes: Vec<Pass>,
     /// Whether the last pass moved no parameter by more than the limit.
     pub converged: bool,
@@ -72,11 +71,11 @@ pub struct Outcome {
     pub form_test: Option<FormTest>,
     /// The estimated model, with the noise that was used.
     pub model: Model,
-    /// Origin of that noise.
+    /// Origin of the noise that was used.
     pub noise: NoiseReport,
     /// Single events that stand out.
     pub events: Vec<Event>,
-    /// Evidence for every error term that may be there.
+    /// Evidence for every error term that may be present.
     pub terms: Vec<TermEvidence>,
     /// Differences between recordings that the data show beyond the stated ones.
     pub differences: Vec<RecordingDifference>,
@@ -155,7 +154,7 @@ impl Outcome {
         })
     }
 
-    /// Whether it may be used.
+    /// Whether the result may be used.
     pub fn is_usable(&self) -> bool {
         Verdict::of(&self.findings).word != Word::Failed
     }
@@ -175,7 +174,7 @@ impl Outcome {
         4.0 * of_run > HEADING_SEEN
     }
 
-    /// The estimate as it may be used: parameters that the run did not observe keep what was known of them.
+    /// The estimate as it may be used: parameters that the run did not observe keep their prior values.
     pub fn usable(&self) -> Estimate {
         let mut values = self.estimate.vector();
         let mut covariance = self.estimate.covariance;
@@ -215,7 +214,7 @@ fn with_all_parts(problem: &Problem, solved: &Solved) -> Estimate {
     estimate
 }
 
-/// Parts of the covariance of an estimate that no chain has: of rounding and of the sample period.
+/// Parts of the covariance that do not come from the chain: rounding and sample period.
 pub fn beside(problem: &Problem, estimate: &Estimate) -> [ParameterMatrix; 2] {
     [
         by_rounding(problem, &estimate.triads),
@@ -284,7 +283,7 @@ fn own(filtered: &Filtered, posterior: &Posterior, at: &Linearisation) -> Vec<Ow
     all
 }
 
-/// Estimates of error terms and table, of those that were asked for or are certain to be there.
+/// Estimates of the error terms and table errors that were requested or are certain.
 pub fn auxiliary(of: &Weighed, solved: &Solved, model: &Model) -> Auxiliary {
     let count = solved.effects.candidates.absent().count();
     let shown = |constant: Constant| {
@@ -297,7 +296,7 @@ pub fn auxiliary(of: &Weighed, solved: &Solved, model: &Model) -> Auxiliary {
     auxiliary_of(&of.posterior, &solved.script.at, model, shown)
 }
 
-/// The same of the constants that are selected.
+/// Estimates of the selected constants.
 pub fn auxiliary_of(
     posterior: &Posterior,
     at: &Linearisation,

@@ -1,4 +1,4 @@
-//! Passes over a recording, and who watches them.
+//! Passes over a recording, and the callback that reports them.
 
 use std::ops::ControlFlow;
 
@@ -9,7 +9,7 @@ use crate::calibration::CalibrationError;
 pub struct Pass {
     /// The largest step of any parameter from the linearisation point, in σ.
     pub largest_step: f64,
-    /// Whitened innovations squared plus prior, summed.
+    /// Sum of squared whitened innovations, plus the prior term.
     pub cost: f64,
     /// Number of scalar observations that entered the cost.
     pub observations: usize,

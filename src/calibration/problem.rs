@@ -62,8 +62,8 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The same problem with another run of the instrument. The priors of the instrument and of the table remain those
-    /// of the first run; each site has its own gravity.
+    /// A copy with an additional run of the instrument. The priors of the instrument and of the table remain those of
+    /// the first run; each site has its own gravity.
     pub fn and(&self, run: &'a Run) -> Self {
         let mut all = self.stretches.to_vec();
         all.extend(stretches(run, self.others.len() + 1, &self.model));
@@ -130,12 +130,12 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The same problem, observed only in the dwells with these numbers.
+    /// A copy that is observed only in the dwells with these numbers.
     pub(in crate::calibration) fn observed_in(&self, used: impl Fn(usize) -> bool) -> Self {
         self.with_dwells(|number, _, dwell| used(number).then(|| dwell.clone()))
     }
 
-    /// The same problem with each dwell, given by number, transformed.
+    /// A copy with each dwell, given by number, transformed.
     pub(in crate::calibration) fn with_dwells(
         &self,
         become_of: impl Fn(usize, &Stretch, &Dwell) -> Option<Dwell>,
@@ -152,7 +152,7 @@ impl<'a> Problem<'a> {
         self.with_stretches(stretches.collect())
     }
 
-    /// The same problem, its run at rest throughout.
+    /// A copy whose run is at rest throughout.
     pub(in crate::calibration) fn as_one_dwell(&self) -> Self {
         let samples = 0..self.run.recording.imu.len();
         let dwell = Dwell {

@@ -95,7 +95,7 @@ impl Solution {
         self.outcome().is_none_or(|outcome| outcome.converged)
     }
 
-    /// Whether it may be used: the filter converged, and noise explains the residuals.
+    /// Whether the solution may be used: the filter converged, and noise explains the residuals.
     pub fn is_usable(&self) -> bool {
         match self {
             Self::Filter(outcome) => outcome.is_usable(),

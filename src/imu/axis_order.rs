@@ -5,9 +5,9 @@ use nalgebra::{Matrix3, Vector3};
 /// A signed permutation of three axes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct AxisOrder {
-    /// For each axis of the result, the index of the axis of the argument …
+    /// For each axis of the result, the index of the axis of the argument.
     pub source: [usize; 3],
-    /// … and whether its sign is reversed.
+    /// For each axis of the result, whether the sign is reversed.
     pub reversed: [bool; 3],
 }
 
@@ -23,7 +23,7 @@ impl AxisOrder {
         source: [1, 0, 2],
         reversed: [false, false, true],
     };
-    /// From front, left, up.
+    /// From front, left, up to right, front, up.
     pub const FRONT_LEFT_UP: Self = Self {
         source: [1, 0, 2],
         reversed: [true, false, false],
@@ -101,7 +101,7 @@ impl AxisOrder {
         }
     }
 
-    /// Whether it is a rotation: right-handed axes stay right-handed.
+    /// Whether the permutation is a rotation: right-handed axes stay right-handed.
     pub fn is_rotation(&self) -> bool {
         self.matrix().determinant() > 0.0
     }

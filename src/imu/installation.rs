@@ -45,7 +45,7 @@ impl InstallationForm {
         }
     }
 
-    /// Whether this form can represent every installation of the other form.
+    /// Whether this form can represent every misalignment of the other form.
     pub fn holds(self, other: Self) -> bool {
         self == other || self != Self::ThreeAngle
     }
@@ -93,7 +93,7 @@ impl InstallationForm {
         d
     }
 
-    /// Splits a sensitivity matrix `A = K C` into scale factors and misalignment angles (design §4).
+    /// Splits a sensitivity matrix `A = K C` into scale factors and misalignment angles.
     ///
     /// General and six-angle reproduce `A` exactly. Three-angle takes `K_i = A_ii` and half the
     /// difference of the two entries of a pair; its error is half their sum. In every form, the sign of a

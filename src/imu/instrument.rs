@@ -50,7 +50,7 @@ impl Instrument {
         PerSensor::from_fn(|sensor| self.prior.get(sensor).mean(form))
     }
 
-    /// 1σ of each parameter before calibration; zero if the form does not have it or the body frame fixes it.
+    /// 1σ of each parameter before calibration; zero if the form lacks the parameter or the body frame fixes it.
     ///
     /// [`Prior`] refers to the mounting face. The accelerometer frame is rotated from it by the accelerometers'
     /// angles above the diagonal. Each of these angles is added to the one across the diagonal and to the gyros'

@@ -49,7 +49,7 @@ pub struct MotionNoise {
 }
 
 impl MotionNoise {
-    /// That of turning by hand: 0.05° (1σ) in a quarter turn of 1.5 s, the size that records of MEMS sensors turned by
+    /// Noise of moves by hand: 0.05° (1σ) in a quarter turn of 1.5 s, the size that records of MEMS sensors turned by
     /// hand show (bandwidth, timing and second-order effects of the sensor).
     pub const BY_HAND: Self = Self {
         by_motion: 7e-4,
@@ -65,8 +65,8 @@ impl GaussMarkov {
 }
 
 impl Noise {
-    /// Covariance, on one axis, of the mean outputs over two time spans (start and end, s): (rad/s)² or (m/s²)².
-    /// For two equal spans it is the variance of the mean.
+    /// Covariance, on one axis, of the mean outputs over two time spans (start and end, s): (rad/s)² or (m/s²)². For
+    /// two equal spans, the covariance is the variance of the mean.
     ///
     /// Random walk is common to both where they overlap; the Gauss–Markov bias is the double integral of
     /// its autocovariance `σ² exp(−|t|/τ)` over both.

@@ -14,7 +14,7 @@ use super::{PARAMETERS, PerSensor, Sensor, Triad};
 pub const HIGHEST_ORDER: usize = 5;
 /// Number of temperature functions: the orders from one on, then the rate.
 pub const THERMAL_FUNCTIONS: usize = HIGHEST_ORDER + 1;
-/// Index of the rate among them.
+/// Index of the rate among the functions.
 pub const RATE: usize = HIGHEST_ORDER;
 
 /// Values of all functions at a time.
@@ -27,10 +27,10 @@ pub type ThermalState = PerSensor<[ThermalValues; 3]>;
 /// The temperature range in which the polynomials of a triad are valid.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ThermalRange {
-    /// The lowest, °C.
+    /// The lowest temperature, °C.
     #[serde(rename = "lowest_degc")]
     pub lowest: f64,
-    /// The highest, °C.
+    /// The highest temperature, °C.
     #[serde(rename = "highest_degc")]
     pub highest: f64,
     /// Reference temperature of the parameters, °C.

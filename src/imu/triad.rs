@@ -108,8 +108,8 @@ impl Triad {
         }
     }
 
-    /// Indices of the misalignment angles above the diagonal of `C`. In the accelerometer body frame, those of the
-    /// accelerometers are zero.
+    /// Indices of the misalignment angles above the diagonal of `C`. In the accelerometer body frame, these angles of
+    /// the accelerometers are zero.
     pub fn above_the_diagonal(form: InstallationForm) -> impl Iterator<Item = usize> {
         let angles = form.angle_names().iter().enumerate();
         angles
@@ -117,7 +117,7 @@ impl Triad {
             .map(|(angle, _)| INSTALLATION + angle)
     }
 
-    /// The same without misalignment angles above the diagonal of `C`.
+    /// A copy without misalignment angles above the diagonal of `C`.
     pub fn along_body_axes(&self) -> Self {
         let mut v = self.to_vector();
         for angle in Self::above_the_diagonal(self.form) {
@@ -221,8 +221,8 @@ impl Prior {
     }
 }
 
-/// The nominal scale of a triad: the file's quantity per second for one rad/s or one m/s², axis by axis. It is the only
-/// conversion between the numbers in a file and the normalised model.
+/// The nominal scale of a triad: the file's quantity per second for one rad/s or one m/s², axis by axis. No other
+/// conversion lies between the numbers in a file and the normalised model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Nominal(pub Vector3<f64>);
 

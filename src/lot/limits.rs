@@ -1,8 +1,8 @@
 //! Limits, and the check of units against them.
 //!
-//! A value x with σ is within [low, high] with probability `Φ((high − x)/σ) − Φ((low − x)/σ)`. It passes if this
-//! probability is at least the stated confidence, and fails if the probability of being outside is. In between, it is
-//! not decided: a guard band on both sides of each limit (JCGM 106:2012, 7.2 and 8.3).
+//! A value x with σ is within [low, high] with probability `Φ((high − x)/σ) − Φ((low − x)/σ)`. The value passes if this
+//! probability is at least the stated confidence, and fails if the probability of being outside is. In between, the
+//! limit is not decided: a guard band on both sides of each limit (JCGM 106:2012, 7.2 and 8.3).
 
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, Normal};
@@ -33,7 +33,7 @@ pub struct Limit {
     pub parameter: usize,
     /// Centre of the range, normalised, in SI.
     pub nominal: f64,
-    /// Largest allowed distance from it.
+    /// Largest allowed distance from the centre.
     pub within: f64,
 }
 
@@ -43,7 +43,7 @@ pub struct Limit {
 pub enum Verdict {
     /// Within the limit, with the stated confidence.
     Pass,
-    /// Neither with the stated confidence.
+    /// Neither within nor outside the limit with the stated confidence.
     NotDecided,
     /// Outside the limit, with the stated confidence.
     Fail,

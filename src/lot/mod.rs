@@ -1,7 +1,8 @@
 //! Several calibrations of one instrument, or of many of one type, side by side.
 //!
-//! All are converted to one form, body frame and nominal scale. Results are mean and spread of each quantity, with a
-//! test whether the spread exceeds the σ of the calibrations; outliers; differences from a truth; limits.
+//! All calibrations are converted to one form, body frame and nominal scale. Results are mean and spread of each
+//! quantity, with a test whether the spread exceeds the σ of the calibrations; outliers; differences from a truth;
+//! limits.
 
 mod joint;
 mod limits;
@@ -37,15 +38,15 @@ pub struct Lot {
     pub rows: Vec<Row>,
     /// The true values, if known.
     pub truth: Option<Row>,
-    /// The common body frame: of the accelerometers if any record is in theirs.
+    /// The common body frame: the accelerometer frame if any record is in it.
     pub body_frame: BodyFrame,
     /// Nominal scales by which all are normalised: for each axis, the median of the values stated in the runs; if none
     /// are stated, the scale factors of the truth, or of the first calibration.
     pub nominal: PerSensor<Nominal>,
     /// Whether a run states nominal scales.
     pub nominal_is_stated: bool,
-    /// Relative 1σ of gravity, if all units were calibrated at one site and therefore share its error. It is part of
-    /// each unit's σ and of the mean's σ, but not of the scatter.
+    /// Relative 1σ of gravity, if all units were calibrated at one site and therefore share its error. This σ is part
+    /// of each unit's σ and of the mean's σ, but not of the scatter.
     pub shared_gravity: Option<f64>,
     /// Every quantity that at least two units have.
     pub statistics: Vec<Statistics>,
@@ -149,7 +150,7 @@ impl Lot {
     }
 }
 
-/// What all records are converted to.
+/// Units and nominal scales to which all records are converted.
 struct Common {
     /// The output of most records; the first of several equally common ones.
     output: Option<PerSensor<String>>,

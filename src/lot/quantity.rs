@@ -58,9 +58,9 @@ impl Quantity {
 /// A value with its 1σ.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample {
-    /// Normalised, in SI.
+    /// Normalised value, in SI.
     pub value: f64,
-    /// Zero if no σ is stated.
+    /// 1σ of the value; zero if none is stated.
     pub sigma: f64,
 }
 

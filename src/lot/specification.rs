@@ -49,7 +49,7 @@ impl Specification {
         Self::of_text(path, &text)
     }
 
-    /// The same of a text that was read from a file.
+    /// Checks the text of a specification that was read from a file.
     pub fn of_text(path: &Path, text: &str) -> Result<Self, FileError> {
         let document = Document::of(path, text);
         let file: SpecificationFile = document.fill(document.of_format(FORMAT)?)?;

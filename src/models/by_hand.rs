@@ -1,4 +1,4 @@
-//! Paths of a sensor turned by hand, stated in words.
+//! Paths of a sensor turned by hand, stated as a list of moves.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -21,7 +21,7 @@ const ACCELERATION: f64 = 90.0 * DEGREE;
 /// right-handed turn about a body axis in degrees. Each dwell lasts 10 s.
 ///
 /// # Errors
-/// A message with the first word that is neither.
+/// A message with the first word that is neither a position nor a turn.
 pub fn path_by_hand(words: &str) -> Result<Path, String> {
     let rotations = words.split(',').map(|word| rotation(word.trim()));
     let mut rotations = rotations.collect::<Result<Vec<_>, _>>()?.into_iter();

@@ -106,7 +106,7 @@ impl Spread {
 pub struct InstallationModel {
     /// The form.
     pub form: InstallationForm,
-    /// Each angle, rad.
+    /// Distribution of each angle, rad.
     pub angles: Spread,
 }
 

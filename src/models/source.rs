@@ -1,4 +1,4 @@
-//! Where a model comes from: a user's file or the embedded text of a name.
+//! Source of a model: a user's file, or embedded text.
 
 use std::path::{Path, PathBuf};
 
@@ -75,7 +75,7 @@ pub enum ModelError {
         nearest.map_or_else(String::new, |nearest| format!(" (did you mean \"{nearest}\"?)"))
     )]
     Unknown {
-        /// The file that names it, with a colon; empty for the command line.
+        /// The file that names the model, with a colon; empty for the command line.
         named_in: String,
         /// The folder.
         room: &'static str,
@@ -149,7 +149,7 @@ impl Text {
     }
 }
 
-/// The same for a named file.
+/// Inconsistent values in a named file: problem and remedy.
 pub fn inconsistent(file: &str, message: impl Into<String>) -> ModelError {
     let error = FileError {
         file: file.into(),

@@ -11,7 +11,7 @@ use turncal_input::{Document, FileError, NonNegative};
 #[derive(Clone, Copy, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TermFile {
-    /// 1σ of each parameter of the error term, around zero; 0 if it is known to be absent
+    /// 1σ of each parameter of the error term, around zero; 0 if the term is known to be absent
     pub sigma: NonNegative,
 }
 

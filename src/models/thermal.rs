@@ -11,11 +11,11 @@ use turncal_input::{Document, FileError, NonNegative};
 /// 1σ, over the instruments of a grade, of the temperature dependence of each parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ThermalVariation {
-    /// Per kelvin, by kind of parameter.
+    /// Linear change per kelvin, by kind of parameter.
     first: [f64; 3],
-    /// Second-order coefficients, per kelvin squared.
+    /// Quadratic change per kelvin squared.
     second: [f64; 3],
-    /// Rate coefficient of a bias, per K/s.
+    /// Change of a bias per K/s.
     rate: f64,
 }
 
@@ -49,7 +49,7 @@ const MINUTE: f64 = 60.0;
 /// `[gyro.temperature]` or `[accel.temperature]` in an instrument file: 1σ of each, zero if not stated.
 pub type ThermalFile = BTreeMap<String, NonNegative>;
 
-/// Scale for 1 K and 1 K² in ppm, installation for 1 K in arc seconds, and bias for 1 K, 1 K² and 1 K/min in °/h or µg.
+/// Scale for 1 K and 1 K² in ppm, misalignment for 1 K in arc seconds, and bias for 1 K, 1 K² and 1 K/min in °/h or µg.
 pub fn thermal_variation(
     document: Document,
     sensor: Sensor,

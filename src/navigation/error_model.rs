@@ -61,8 +61,8 @@ pub struct ErrorModel {
 }
 
 impl ErrorModel {
-    /// The model about a true state with this specific force along body axes, m/s². If height is held, its
-    /// error and that of vertical velocity are zero, and seven states remain.
+    /// The model about a true state with this specific force along body axes, m/s². If height is held, the errors of
+    /// height and vertical velocity are zero, and seven states remain.
     pub fn about(truth: &Solution, force: &Vector3<f64>, height: Height) -> Self {
         let (latitude, transport) = (truth.latitude, truth.transport_rate());
         let earth = earth_rate_n(latitude);
@@ -218,7 +218,7 @@ pub struct Linearisation {
 }
 
 impl Linearisation {
-    /// About a true motion.
+    /// The linear model about a true motion.
     pub fn about(at: &Instant, sensed: &SensedErrors) -> Self {
         let ErrorModel { dynamics, input } = at.linear_model();
         Self {

@@ -76,7 +76,7 @@ impl NavigationError {
     }
 }
 
-/// Of longitude and of latitude.
+/// Metres per radian of longitude and of latitude.
 fn metres_per_radian(truth: &Solution) -> [f64; 2] {
     let radii = Curvature::at(truth.latitude);
     [radii.prime_vertical * truth.latitude.cos(), radii.meridian]

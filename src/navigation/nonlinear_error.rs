@@ -29,12 +29,13 @@ const SCALAR: usize = STATES;
 /// The vector part in place of attitude, velocity and position as in an [`ErrorVector`], and the scalar part.
 type Errors = SVector<f64, { STATES + 1 }>;
 
-/// Computed minus true navigation, with the height fixed to the true one: E rotates true to computed East-North-Up.
+/// Computed minus true navigation, with the height fixed to the true height: E rotates true to computed East-North-Up.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NonlinearError(Errors);
 
 impl NonlinearError {
-    /// The errors at the start, in the order of [`super::ErrorModel`]; those of the fixed vertical channel are ignored.
+    /// The errors at the start, in the order of [`super::ErrorModel`]; errors of the fixed vertical channel are
+    /// ignored.
     pub fn new(start: &ErrorVector) -> Self {
         let turn = UnitQuaternion::from_scaled_axis(-start.fixed_rows::<3>(ATTITUDE));
         let mut errors = start.push(turn.w);

@@ -52,7 +52,7 @@ pub struct Passage {
     navigation: Rows<STATES, STATES>,
     /// Effect of `C_b_n b_k` at the input of each triad on the navigation errors.
     inputs: PerSensor<Rows<STATES, INPUTS>>,
-    /// The same for a constant downward acceleration.
+    /// Effect of a constant downward acceleration on the navigation errors.
     gravity: Rows<STATES, 1>,
     terms: Vec<TermErrors>,
     noise: NoiseInputs,

@@ -46,7 +46,7 @@ pub struct Navigator<'a> {
     on: Vec<usize>,
     /// Values of all parameters of error terms; zero where off.
     terms: TermVector,
-    /// Whether any of them is nonzero.
+    /// Whether any of these values is nonzero.
     shifted: bool,
     /// The current state.
     pub state: State,
@@ -86,7 +86,7 @@ impl<'a> Navigator<'a> {
         })
     }
 
-    /// The same with temperature-dependent triads; the current ones are at the reference.
+    /// A copy with temperature-dependent triads; the current triads are those at the reference temperature.
     pub fn with_thermal(
         mut self,
         model: Arc<ThermalModel>,
@@ -250,8 +250,9 @@ impl<'a> Navigator<'a> {
     }
 
     /// The block of these samples for a table at rest in this attitude, with the current state. The sensed input is
-    /// known, so the error model uses the attitude, as for one long sample. If it used the samples, their noise would
-    /// be in both the innovations and the sensitivity to scale factors, and the product would look like information.
+    /// known, so the error model uses the attitude, as for one long sample. If the error model used the samples, their
+    /// noise would enter both the innovations and the sensitivity to scale factors, and the product would look like
+    /// information.
     pub fn standing(&self, attitude: &Matrix3<f64>, samples: Range<usize>) -> Block {
         let duration = samples.len() as f64 * self.imu.period;
         let change = -self.gravity * duration;
@@ -269,7 +270,8 @@ impl<'a> Navigator<'a> {
         self.block(passage)
     }
 
-    /// The same for samples with interpolated ones, given the block of the same number in the same attitude.
+    /// As [`Self::standing`] for samples that include interpolated ones, given the block of equally many samples in the
+    /// same attitude.
     pub fn standing_like(&self, block: &Block, samples: &Range<usize>) -> Block {
         let mut like = block.clone();
         for part in &mut like.noise.parts {

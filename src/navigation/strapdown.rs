@@ -72,7 +72,8 @@ impl Solution {
         )
     }
 
-    /// The same attitude and velocity at another place, displaced in latitude and longitude (rad) and height (m).
+    /// A copy with unchanged attitude and velocity at another place, displaced in latitude and longitude (rad) and
+    /// height (m).
     pub(super) fn moved(&self, by: &Vector3<f64>) -> Self {
         Self {
             latitude: self.latitude + by.x,

@@ -22,7 +22,7 @@ const LEAST_ROUND: f64 = 1.0;
 
 /// A start and segments, which repeat.
 ///
-/// The body points along its velocity: heading is that of the velocity, pitch its angle above the horizon.
+/// The body points along its velocity: heading is the direction of the velocity, pitch its angle above the horizon.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Trajectory {
     start: Start,
@@ -36,7 +36,7 @@ pub enum TrajectoryError {
     /// The segments take no time.
     #[error("the segments together take {found} s; give one of them a duration_s or a move")]
     Short {
-        /// Their duration, s.
+        /// Duration of all segments, s.
         found: f64,
     },
     /// A climb or descent that is too steep.
@@ -96,13 +96,13 @@ impl Trajectory {
         &self.start
     }
 
-    /// The same from another latitude in radians.
+    /// A copy that starts at another latitude in radians.
     pub fn at_latitude(mut self, latitude: f64) -> Self {
         self.start.latitude = latitude;
         self
     }
 
-    /// The same from another height in m, all other heights moved with it.
+    /// A copy that starts at another height in m; all other heights move with it.
     pub fn at_height(mut self, height: f64) -> Self {
         let raised = height - self.start.height;
         self.start.height = height;

@@ -5,7 +5,7 @@
 pub struct Curve {
     /// Cluster times τ, s.
     pub tau: Vec<f64>,
-    /// Allan variance at each, (rad/s)² or (m/s²)².
+    /// Allan variance at each cluster time, (rad/s)² or (m/s²)².
     pub variance: Vec<f64>,
 }
 

@@ -17,7 +17,7 @@ use crate::units::{
 enum Scale {
     /// A multiple of this unit.
     Linear(f64),
-    /// The square, with the unit of its root.
+    /// A square, with the unit of its root.
     Power(f64),
     /// 1σ of each rate sample, at a sample rate.
     Samples(f64),
@@ -50,7 +50,7 @@ impl Scale {
 #[derive(Debug, PartialEq)]
 struct Quantity {
     sensor: Sensor,
-    /// Such as `angle random walk`.
+    /// Name of the quantity, such as `angle random walk`.
     name: &'static str,
     conventions: &'static [Convention],
 }
@@ -180,7 +180,7 @@ pub struct Conversion {
 /// A noise figure in one convention.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Figure {
-    /// In the unit of the convention.
+    /// Value in the unit of the convention.
     pub value: f64,
     /// The convention.
     #[serde(flatten)]
@@ -200,7 +200,7 @@ pub enum ConversionError {
         /// As given.
         unit: String,
     },
-    /// A figure per sample needs the sample rate.
+    /// A figure per sample without the sample rate.
     #[error(
         "`{unit}` is noise per sample, which needs the sample rate: add --rate with the rate in Hz"
     )]

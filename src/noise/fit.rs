@@ -21,7 +21,7 @@ pub struct Weighted<'a> {
 }
 
 impl<'a> Weighted<'a> {
-    /// `None` if the covariance is not positive definite.
+    /// The points with their weights; `None` if the covariance is not positive definite.
     pub fn new(tau: &'a [f64], variance: &'a [f64], covariance: DMatrix<f64>) -> Option<Self> {
         let root = covariance.cholesky()?;
         Some(Self {

@@ -55,7 +55,7 @@ impl Process {
         correlation_time: 1.0,
     };
 
-    /// Whether both are of one kind, whatever their correlation times.
+    /// Whether both processes are of one kind, whatever their correlation times.
     pub fn same_kind(self, other: Self) -> bool {
         std::mem::discriminant(&self) == std::mem::discriminant(&other)
     }

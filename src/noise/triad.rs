@@ -21,8 +21,8 @@ const PEAK: f64 = 1.89;
 pub struct TriadNoise {
     /// x, y, z.
     pub axes: [AxisNoise; 3],
-    /// Noise from the mean Allan variance of all axes that vary. If axes are alike, it resolves more than each
-    /// alone. Processes found on all axes are kept within the range of the axes.
+    /// Noise from the mean Allan variance of all axes that vary. If the axes are alike, the mean resolves more than
+    /// each axis alone. Processes found on all axes are kept within the range of the axes.
     pub mean: AxisNoise,
 }
 
@@ -145,9 +145,9 @@ fn knocks(values: &[f64]) -> usize {
     steps.iter().filter(|step| **step > limit).count()
 }
 
-/// Result for the mean of several axes, with every process found on all axes. Figures of the mean are kept if they
-/// lie within those of the axes; else they are replaced by the root mean square of the axes. The mean separates
-/// processes better, but a process found in the mean only reduces the others.
+/// Result for the mean of several axes, with every process found on all axes. Figures of the mean are kept if they lie
+/// within the range of the axes; otherwise the root mean square of the axes replaces them. The mean separates processes
+/// better, but a process found in the mean only reduces the others.
 pub fn within(mut mean: Identified, axes: &[&Identified]) -> Identified {
     if axes.is_empty() {
         return mean;

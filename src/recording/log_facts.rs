@@ -91,13 +91,13 @@ impl NamedColumns {
 pub struct ColumnFacts {
     /// Name in the file.
     pub name: String,
-    /// The smallest value …
+    /// The smallest value.
     pub smallest: f64,
-    /// … and how many rows have it.
+    /// Number of rows with the smallest value.
     pub at_smallest: usize,
-    /// The largest value …
+    /// The largest value.
     pub largest: f64,
-    /// … and how many rows have it.
+    /// Number of rows with the largest value.
     pub at_largest: usize,
     /// The step of the grid on which all values lie, if they do.
     pub step: Option<f64>,

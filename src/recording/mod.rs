@@ -74,7 +74,7 @@ impl Recording {
         Ok(Self::of(name, imu))
     }
 
-    /// These samples alone.
+    /// A recording of these samples alone.
     pub fn of(name: &str, imu: ImuSamples) -> Self {
         Self {
             name: name.to_owned(),

@@ -11,15 +11,15 @@ use crate::imu::{PerSensor, Sensor};
 /// The samples of both triads, at one period, in one stretch or several.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ImuSamples {
-    /// Length of every sample, s …
+    /// Length of every sample, s.
     pub period: f64,
-    /// … and its relative 1σ; zero if a clock determines it.
+    /// Relative 1σ of the sample length; zero if a clock determines it.
     pub period_sigma: f64,
     /// Stretches of consecutive samples, in order; at least one. Between two stretches at least one sample is
     /// lost.
     pub stretches: Vec<Stretch>,
-    /// Whether samples are consecutive in time; if not, they are concatenated sections, and only a labelled section or
-    /// a dwell is continuous.
+    /// Whether samples are consecutive in time; otherwise they are concatenated sections, and only a labelled section
+    /// or a dwell is continuous.
     pub continuous: bool,
     /// Integrals of the normalised gyro output over each sample, rad.
     pub gyro: Series,
@@ -39,7 +39,7 @@ pub struct ImuSamples {
 }
 
 impl ImuSamples {
-    /// Whether a triad was recorded; if not, its samples are zeros.
+    /// Whether a triad was recorded; otherwise its samples are zeros.
     pub fn has(&self, sensor: Sensor) -> bool {
         let is_named = |log: &LogFacts| !log.named.triads.get(sensor)[0].name.is_empty();
         self.log.as_ref().is_none_or(is_named)
@@ -51,7 +51,7 @@ impl ImuSamples {
 pub struct Stretch {
     /// The samples.
     pub samples: Range<usize>,
-    /// Start time of the first of them, s.
+    /// Start time of the first sample, s.
     pub start: f64,
 }
 
@@ -89,7 +89,7 @@ impl ImuSamples {
         sensor.pick(&self.gyro, &self.accel)
     }
 
-    /// Whether they are packed, as in long recordings.
+    /// Whether the samples are packed, as in long recordings.
     pub fn is_packed(&self) -> bool {
         self.gyro.is_packed()
     }

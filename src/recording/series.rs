@@ -27,12 +27,12 @@ impl Series {
         self.packed.as_ref().map_or(self.whole.len(), Packed::len)
     }
 
-    /// Whether there are none.
+    /// Whether there are no samples.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Whether they are packed, which makes reading slower; unpacking many at once takes memory.
+    /// Whether the increments are packed, which makes reading slower; unpacking many at once takes memory.
     pub fn is_packed(&self) -> bool {
         self.packed.is_some()
     }

@@ -15,7 +15,7 @@ pub const SHORTEST: f64 = 0.5;
 /// Samples during which the instrument is at rest.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dwell {
-    /// Samples that lie completely within it.
+    /// Samples that lie completely within the dwell.
     pub samples: Range<usize>,
     /// Position of the table; `None` without a table.
     pub position: Option<Position>,

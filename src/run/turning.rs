@@ -13,9 +13,9 @@ use crate::units::DEGREE;
 pub const STEP: f64 = 0.1;
 /// Smallest angle that counts as a turn, rad.
 pub const SMALLEST: f64 = 1.0 * DEGREE;
-/// A turn disagrees if its angle is off by more than this part of it …
+/// A turn disagrees if its angle differs by more than this part.
 const OTHER_ANGLE: f64 = 0.1;
-/// … or by more than this many σ of the gyros' scale factor, whichever is larger.
+/// A turn disagrees only if its angle also differs by more than this many σ of the gyros' scale factor.
 pub const SCALE_SIGMAS: f64 = 5.0;
 
 /// Maximum relative error of a gyro turn that still agrees with a label or the table.

@@ -115,7 +115,7 @@ impl SimulatedCampaign {
         Some(first.truth_over(simulated, &first.common))
     }
 
-    /// Common and individual properties of its recordings, as an engineer would state them.
+    /// Common and individual properties of the recordings, as an engineer would state them.
     pub fn together(&self) -> Together {
         let chambers = self.recordings.iter().map(|(_, own)| own);
         let warms = self.scenario.chamber.is_some() || chambers.flatten().next().is_some();

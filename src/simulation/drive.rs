@@ -17,7 +17,7 @@ pub struct Drive {
     pub ideal: PerSensor<Vec<Vector3<f64>>>,
     /// Time, position number and attitude of a perfect table at each reading.
     pub read: Vec<(f64, usize, Matrix3<f64>)>,
-    /// Axis angles at each of these times; during a move, those of the position before it.
+    /// Axis angles at each of these times; during a move, the angles of the position before the move.
     pub axes: Vec<AxisAngles>,
 }
 
@@ -45,7 +45,7 @@ impl Drive {
         })
     }
 
-    /// Whether it has this imperfection and these error terms.
+    /// Whether the drive has this imperfection and these error terms.
     pub fn is_of(&self, imperfection: &Imperfection, terms: &TermVector) -> bool {
         (&self.imperfection, &self.terms) == (imperfection, terms)
     }

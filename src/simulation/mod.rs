@@ -46,13 +46,13 @@ pub struct Simulated {
     /// The instrument's true parameters; if they depend on temperature, those at the reference of
     /// [`Self::thermal`].
     pub truth: PerSensor<Triad>,
-    /// The same without the deviations of this recording.
+    /// True parameters without the deviations of this recording.
     pub common: PerSensor<Triad>,
-    /// The true parameters of its error terms.
+    /// True parameters of the instrument's error terms.
     pub terms: TermVector,
     /// The table's true geometry, in the order of [`crate::turntable::TableGeometry::vector`], rad.
     pub geometry: SVector<f64, TABLE_GEOMETRY>,
-    /// Their temperature dependence, if any.
+    /// Temperature dependence of the true parameters, if any.
     pub thermal: Option<ThermalTruth>,
     /// Quantity of a sample when the run is written to a file.
     pub output: Output,
@@ -72,7 +72,7 @@ impl Simulated {
         }
     }
 
-    /// These triads as truth, with their dependence on temperature over the range of some recordings.
+    /// A truth of these triads, with their dependence on temperature over the range of some recordings.
     fn truth_over(&self, recordings: &[Self], triads: &PerSensor<Triad>) -> Calibration {
         let Some(thermal) = &self.thermal else {
             return truth_record(triads, &self.run);
@@ -139,8 +139,8 @@ impl Scenario {
         self.simulate_recording(seed, stream, stream, &Difference::default())
     }
 
-    /// The same for the instrument of one stream with all other random numbers from another, as for one of its
-    /// recordings, with parameter differences `own`.
+    /// Simulates one recording of the instrument of one stream, with all other random numbers from another stream and
+    /// with parameter differences `own`.
     ///
     /// # Errors
     /// If the table cannot follow the path.
@@ -154,7 +154,7 @@ impl Scenario {
         self.simulate_on(None, seed, instrument, stream, own)
     }
 
-    /// The same with an existing drive, if it matches this recording.
+    /// Simulates with an existing drive, if it matches this recording.
     fn simulate_on(
         &self,
         made: Option<&Drive>,

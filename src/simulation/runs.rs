@@ -14,7 +14,7 @@ pub struct Runs {
 }
 
 impl Runs {
-    /// For a scenario.
+    /// The runs of a scenario.
     ///
     /// # Errors
     /// If the table cannot follow the path.
@@ -26,7 +26,7 @@ impl Runs {
         })
     }
 
-    /// Simulates one of them, as [`Scenario::simulate`] does.
+    /// Simulates one run, as [`Scenario::simulate`] does.
     ///
     /// # Errors
     /// If the table cannot follow the path.

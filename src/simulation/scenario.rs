@@ -32,7 +32,7 @@ pub struct Scenario {
     pub site: Site,
     /// The grade of instrument.
     pub instrument: Instrument,
-    /// Installation.
+    /// Misalignment form, with the distribution of its angles.
     pub installation: InstallationModel,
     /// The true body frame: in the accelerometer frame, the misalignment angles that it
     /// fixes are not drawn.
@@ -118,7 +118,7 @@ impl Scenario {
         Ok(scenario)
     }
 
-    /// The same scenario with a different path, given by embedded name or file.
+    /// A copy with a different path, given by embedded name or file.
     ///
     /// # Errors
     /// If it does not exist, is malformed, or does not fit the table.
@@ -128,7 +128,7 @@ impl Scenario {
         along.map_err(|message| models::inconsistent(name_or_path, message))
     }
 
-    /// The same scenario along a path of this name.
+    /// A copy along a path of this name.
     ///
     /// # Errors
     /// A message if it does not fit the table, or takes too many samples.
@@ -142,7 +142,7 @@ impl Scenario {
         Ok(scenario)
     }
 
-    /// The same scenario with an error term, of usual magnitude unless its models state one.
+    /// A copy with an error term, of usual magnitude unless its models state one.
     pub fn with_error_term(mut self, block: ErrorTerm) -> Self {
         match block {
             ErrorTerm::GaussMarkovBias => {
@@ -176,7 +176,7 @@ impl Scenario {
         self
     }
 
-    /// Whether its runs include an error term.
+    /// Whether the runs of the scenario include an error term.
     pub fn has(&self, block: ErrorTerm) -> bool {
         let sees_table = self.body_frame == BodyFrame::Table;
         let errors = &self.table.errors;
@@ -215,7 +215,7 @@ impl Scenario {
         Ok(self.motion()?.duration())
     }
 
-    /// Total time of the dwells in it, s.
+    /// Total time of the dwells in a run, s.
     ///
     /// # Errors
     /// If the table cannot follow the path.

@@ -76,7 +76,7 @@ pub struct Warming {
 }
 
 impl Warming {
-    /// At a time, °C, and its rate, K/s.
+    /// Temperature at a time, °C, and its rate, K/s.
     pub fn at(&self, time: f64) -> (f64, f64) {
         let last = self.values.len() - 2;
         let at = (time / STEP).max(0.0);

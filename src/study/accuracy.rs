@@ -114,7 +114,7 @@ impl Accuracy {
         filtered(&self.trials)
     }
 
-    /// The filter's misalignment form and that of the truth.
+    /// The misalignment forms of the filter and of the truth.
     pub fn forms(&self) -> (InstallationForm, InstallationForm) {
         (self.study.form, self.study.scenario.installation.form)
     }

@@ -41,7 +41,7 @@ impl CheckedCalibration {
         })
     }
 
-    /// Consequences of the calibration of this problem; the truth may be unknown.
+    /// Consequences of the calibration of this problem. The truth may be unknown.
     pub fn consequences(
         &self,
         problem: &Problem,

@@ -73,7 +73,7 @@ pub struct Experiment {
     pub table_times: Vec<f64>,
     /// Every instrument, in order.
     pub trials: Vec<Trial>,
-    /// Each of [`Situation::ALL`].
+    /// Results in each of [`Situation::ALL`].
     pub navigations: Vec<Navigated>,
 }
 
@@ -82,7 +82,7 @@ pub struct Experiment {
 pub struct Navigated {
     /// The situation.
     pub situation: Situation,
-    /// Each of [`Method::all`].
+    /// Results of each of [`Method::all`].
     pub methods: Vec<Worth>,
     /// Horizontal position error at the end in nmile due to the noise of alignment and navigation alone, the
     /// same after every calibration.
@@ -94,15 +94,15 @@ pub struct Navigated {
 pub struct Worth {
     /// The method.
     pub method: Method,
-    /// At the end, in the order of the instruments that have a calibration.
+    /// Errors at the end, in the order of the instruments that have a calibration.
     pub errors: Vec<f64>,
     /// At the end.
     pub at_end: Spread,
     /// 99 % bootstrap interval of the median at the end.
     pub median_interval: (f64, f64),
-    /// Maximum over all minutes.
+    /// Maximum error over all minutes.
     pub largest: Spread,
-    /// At the end, due to the errors of one triad alone.
+    /// Errors at the end due to the errors of one triad alone.
     pub by_one: PerSensor<Spread>,
     /// Final median of the closed form in the same misalignment form divided by that of this method; `None` for the
     /// closed form.

@@ -1,5 +1,5 @@
-//! Navigation accuracy of a calibration: the navigation error due to its errors, by the nonlinear equations of
-//! navigation, and the σ of this error predicted from its covariance, by the linear model.
+//! Navigation accuracy of a calibration: the nonlinear equations of navigation give the navigation error due to the
+//! errors of the calibration, and the linear model predicts σ of this error from the covariance.
 
 mod methods;
 mod outlook;
@@ -51,7 +51,7 @@ impl Motion {
         })
     }
 
-    /// Along a named trajectory, which is also returned by its name, moved to another latitude in rad or height in m.
+    /// Motion along a named trajectory, whose name is also returned, moved to another latitude in rad or height in m.
     ///
     /// # Errors
     /// [`ModelError`] if it cannot be read.
@@ -225,7 +225,7 @@ impl Mission {
         Ok(moments)
     }
 
-    /// Only the errors, from their nonlinear equations, in milliseconds for 40 h at rest.
+    /// Navigation errors without σ, from their nonlinear equations: takes milliseconds for 40 h at rest.
     ///
     /// # Errors
     /// As for [`Self::navigate`].
@@ -233,7 +233,7 @@ impl Mission {
         self.errors_from(&ErrorVector::zeros(), pair)
     }
 
-    /// The same from a start with these errors.
+    /// As [`Self::errors`], from a start with these errors.
     ///
     /// # Errors
     /// As for [`Self::navigate`].
@@ -262,8 +262,8 @@ impl Mission {
         Ok(moments)
     }
 
-    /// Sensitivity to each parameter, by the linear model, at the start and after each interval. It depends so
-    /// little on the instrument that one serves for a whole grade.
+    /// Sensitivity to each parameter, by the linear model, at the start and after each interval. The sensitivity
+    /// depends so little on the instrument that one result serves for a whole grade.
     ///
     /// # Errors
     /// As for [`Self::navigate`].
@@ -274,7 +274,7 @@ impl Mission {
         self.exposure_from(Sensitivity::zeros(), truth)
     }
 
-    /// The same if the initial errors also depend on the parameters.
+    /// As [`Self::exposure`], if the initial errors also depend on the parameters.
     ///
     /// # Errors
     /// As for [`Self::navigate`].
@@ -303,7 +303,7 @@ impl Mission {
         Ok(exposures)
     }
 
-    /// The same step by step along a trajectory.
+    /// As [`Self::exposure`], step by step along a trajectory.
     fn exposure_moving(
         &self,
         mut sensitivity: Sensitivity,
@@ -334,8 +334,7 @@ impl Exposure {
         self.by_parameter.fixed_rows::<2>(6).into_owned()
     }
 
-    /// Covariance of the errors from that of the parameters, in the order of
-    /// [`NavigationError::to_vector`].
+    /// Covariance of the errors from the covariance of the parameters, in the order of [`NavigationError::to_vector`].
     pub fn covariance(&self, parameters: &ParameterMatrix) -> ErrorMatrix {
         self.by_parameter * parameters * self.by_parameter.transpose()
     }

@@ -24,10 +24,10 @@ pub struct PathStudy {
     pub options: Options,
 }
 
-/// Names of a path and of what it is evaluated with.
+/// Names of a path and of the models with which it is evaluated.
 #[derive(Debug, Clone, Default)]
 pub struct Named<'a> {
-    /// The path: a TOML file, an embedded name, or words for turns by hand.
+    /// The path: a TOML file, an embedded name, or or a list of moves by hand.
     pub path: &'a str,
     /// The scenario; `None` for the usual one.
     pub scenario: Option<&'a str>,
@@ -46,7 +46,7 @@ pub struct Named<'a> {
 pub struct Evaluation {
     /// Duration, s.
     pub duration: f64,
-    /// Total duration of its dwells, s.
+    /// Total duration of the dwells, s.
     pub standing: f64,
     /// Observations of the filter.
     pub aiding: Aiding,
@@ -60,12 +60,12 @@ pub struct Evaluation {
     pub navigation: Vec<Outlook>,
 }
 
-/// What a calibration would know without a move: attitude, velocity and position may have become anything in it.
+/// Accuracy of a calibration without a move, in which attitude, velocity and position may change to anything.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Without {
     /// Time of the move and the dwell after it, s.
     pub time: f64,
-    /// Expected σ without it.
+    /// Expected σ without the move.
     pub sigma: ParameterVector,
 }
 
@@ -86,10 +86,10 @@ pub enum PathError {
     /// A model cannot be read.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// Words that are not turns.
+    /// Words that are not moves.
     #[error("{0}")]
     Words(String),
-    /// The table cannot follow it.
+    /// The table cannot follow the path.
     #[error(transparent)]
     Table(#[from] TableError),
     /// No calibration is possible.

@@ -1,6 +1,6 @@
-//! The next move of a hand-held sensor: of 26 attitudes and six turns, the one that lowers σ most.
+//! The next move of a hand-held sensor: the one of 26 attitudes and six turns that lowers σ most.
 //!
-//! The information of a move is that of a short recording of it (dwell, turn, dwell), added to that of the recording
+//! The information of a short recording of the move (dwell, turn, dwell) is added to the information of the recording
 //! so far.
 
 use std::collections::BTreeMap;

@@ -50,7 +50,7 @@ pub struct InterimCalibration {
     inflation: ParameterVector,
 }
 
-/// Evaluates a recording again and again while it grows.
+/// Evaluates a recording repeatedly while it grows.
 #[derive(Debug, Clone, Default)]
 pub struct Evaluator {
     options: Options,
@@ -62,7 +62,7 @@ pub struct Evaluator {
 }
 
 impl Evaluator {
-    /// For these options and, if any, limits to decide.
+    /// An evaluator for these options and, if any, limits to decide.
     pub fn new(options: Options, specification: Option<Specification>) -> Self {
         Self {
             options,
@@ -76,7 +76,7 @@ impl Evaluator {
         self.specification.as_ref()
     }
 
-    /// State of the recording so far, which is calibrated first if that is due.
+    /// State of the recording so far; calibrates the recording first if a calibration is due.
     pub fn status(&mut self, run: &Run, progress: Progress) -> Status {
         let status = self.outlook(run);
         let Some(due) = self.due(run, &status) else {
@@ -86,8 +86,8 @@ impl Evaluator {
         self.outlook(run)
     }
 
-    /// State of the recording so far, without a calibration: σ are those of the last one, changed by the expected
-    /// effect of the rows since.
+    /// State of the recording so far, without a calibration: σ are those of the last calibration, changed by the
+    /// expected effect of later rows.
     pub fn outlook(&mut self, run: &Run) -> Status {
         let imu = &run.recording.imu;
         let survey = Survey::of_motion(run);

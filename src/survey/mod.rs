@@ -59,7 +59,7 @@ pub enum Path {
 }
 
 impl Path {
-    /// All of them.
+    /// All methods.
     pub const ALL: [Self; 3] = [Self::SixPosition, Self::TableAiding, Self::VelocityAiding];
 
     /// Options of `calibrate`.

@@ -13,7 +13,7 @@ use crate::run::Run;
 /// Interval between evaluations, s.
 const EVERY: f64 = 1.0;
 
-/// A calibration in progress, whose samples are pushed as they arrive. It has no thread of its own.
+/// A calibration in progress, whose samples are pushed as they arrive. The session has no thread of its own.
 ///
 /// Rates are in rad/s and specific forces in m/s², along right-front-up body axes, one sample per period.
 #[derive(Debug, Clone)]

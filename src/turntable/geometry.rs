@@ -63,7 +63,7 @@ impl AxisError {
         self.of_axis(0).start..self.of_axis(AXES - 1).end
     }
 
-    /// The same 1σ for its errors on a table with this many axes.
+    /// This 1σ for each error of the kind on a table with this many axes.
     pub fn of_table(self, axes: usize, sigma: f64) -> SVector<f64, AXIS_ERRORS> {
         let mut all = SVector::<f64, AXIS_ERRORS>::zeros();
         for axis in 0..axes.min(AXES) {

@@ -74,7 +74,7 @@ pub enum Rotation {
 }
 
 impl Moves {
-    /// Their number.
+    /// Number of steps.
     pub fn len(&self) -> usize {
         match self {
             Self::Axes { steps, .. } => steps.len(),

@@ -361,7 +361,7 @@ impl Calibration {
         Some(Report(of_lot::document(&lot)))
     }
 
-    /// What to know before using the values: problem, meaning and remedy, the most severe first.
+    /// Findings to read before using the values: problem, meaning and remedy, the most severe first.
     #[getter]
     fn findings(&self) -> Vec<String> {
         let text = |finding: &Finding| in_python(&format!("{} {}", finding.code, finding.text));
@@ -375,10 +375,9 @@ impl Calibration {
     /// data : DataFrame, Dataset of xarray, array of shape (rows, columns), mapping of arrays, or Run, optional
     ///     Samples as logged.
     /// gyro, accel : (x, y, z), (x, y, z, unit) or array of shape (n, 3), optional
-    ///     Columns along right, front and up; a minus before a name reverses a column. Default: those of the run that
-    ///     was calibrated, by name.
+    ///     Columns along right, front and up; a minus before a name reverses a column. Default: the columns of the calibrated run, by name.
     /// rate : float, optional
-    ///     Rows per second, for increments and pulses. Default: that of the run that was calibrated.
+    ///     Rows per second, for increments and pulses. Default: the rate of the calibrated run.
     ///
     /// Returns
     /// -------

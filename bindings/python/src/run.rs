@@ -118,7 +118,7 @@ pub struct Request {
     pub specification: Option<Specification>,
 }
 
-/// A recording with what is known of instrument and site, from :func:`read`, :func:`run` or :func:`simulate`.
+/// A recording with the knowledge about instrument and site, from :func:`read`, :func:`run` or :func:`simulate`.
 ///
 /// Attributes
 /// ----------
@@ -229,8 +229,8 @@ impl Run {
     /// method : {"ekf", "six-position"}
     ///     The filter over the whole run, or the closed form from dwells.
     /// with_ : str or sequence of str, optional
-    ///     "auto" (default): every error term is averaged over being absent and its usual sizes; "none": K, E, D alone;
-    ///     or terms to estimate whatever the data say, such as "accel-second-order".
+    ///     "auto" (default): averages over the absence and the usual sizes of every error term; "none": only K, E and D;
+    ///     or terms to estimate in any case, such as "accel-second-order".
     /// noise : {"auto", "stated", "learnt"}
     ///     Stated noise unless the data contradict it, stated noise, or noise estimated from the run.
     /// temperature : bool
@@ -248,7 +248,7 @@ impl Run {
     /// Raises
     /// ------
     /// Error
-    ///     If the run cannot be calibrated. Read `verdict` before using the values of one that could.
+    ///     If the run cannot be calibrated. Otherwise, read `verdict` before using the values.
     #[pyo3(signature = (
         method="ekf", with_=None, noise="auto", temperature=false, progress=None, specification=None,
     ))]

@@ -26,11 +26,11 @@ use crate::wait::finish;
 /// sensor : str
 ///     Sensor whose data sheet gives noise and tolerances, such as "bmi088", or a TOML file.
 /// latitude, height : float, optional
-///     Of the site, degrees (north positive) and m above the ellipsoid.
+///     Latitude of the site in degrees (north positive), and height in m above the ellipsoid.
 /// gravity : float, optional
-///     At the site, m/s².
+///     Gravity at the site, m/s².
 /// specification : path-like, optional
-///     Limits that the calibration is to decide, by name or as a TOML file.
+///     Specification with the limits that the calibration must decide, by name or as a TOML file.
 #[pyclass(frozen, module = "turncal")]
 pub struct Session(Arc<Mutex<survey::Session>>);
 
@@ -71,7 +71,7 @@ impl Session {
     /// Returns
     /// -------
     /// dict or None
-    ///     The status, if a second of samples has arrived since the last one.
+    ///     The status, if a second of samples has arrived since the last status.
     fn push<'py>(
         &self,
         py: Python<'py>,

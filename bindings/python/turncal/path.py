@@ -25,7 +25,7 @@ def evaluate(
     Parameters
     ----------
     path : str
-        An embedded name such as "three-axis", a TOML file, or words for a sensor turned by hand, such as
+        An embedded name such as "three-axis", a TOML file, or a list of moves by hand, such as
         "z_up, x_up, x_down, turn z 180".
     scenario : str, optional
         Scenario with site, rate, instrument and table. Default: "demo"; by hand "mems".
@@ -34,10 +34,10 @@ def evaluate(
     aiding : {"table", "velocity"}, optional
         Observations of the filter. Default: table; by hand velocity.
     with_ : str or sequence of str, optional
-        "auto" (default): every error term is averaged over being absent and its usual sizes; "none": K, E, D alone; or
-        terms to estimate whatever the data say.
+        "auto" (default): averages over the absence and the usual sizes of every error term; "none": only K, E and D; or
+        terms to estimate in any case.
     specification : path-like, optional
-        Limits that the calibration must decide.
+        Specification: tests whether the predicted σ are small enough to decide pass or fail.
 
     Returns
     -------

@@ -64,8 +64,8 @@ pub struct Evaluate {
     /// Observations of the filter [default: table; by hand: velocity]
     #[arg(long, value_parser = one_of(&AIDINGS))]
     aiding: Option<Aiding>,
-    /// Error terms of the calibration. auto: every error term is averaged over being absent and its usual sizes; none:
-    /// K, E, D alone; or terms to estimate whatever the data say [default: auto]
+    /// Error terms of the calibration. auto: averages over the absence and the usual sizes of every term; none: only K,
+    /// E and D; or names of terms to estimate in any case [default: auto]
     #[arg(long, value_name = "TERM", value_parser = with_value(), value_delimiter = ',')]
     with: Vec<With>,
     /// Specification: tests whether the predicted σ are small enough to decide pass or fail

@@ -57,7 +57,7 @@ impl Opened {
         Ok(opened)
     }
 
-    /// The same for files in memory: a `run.toml` or a log, which may name the others.
+    /// As [`Self::new`] for files in memory: a `run.toml` or a log, which may name the others.
     ///
     /// # Errors
     /// As for [`Self::new`].
@@ -82,8 +82,8 @@ impl Opened {
     ) -> Result<Self, FileError> {
         if is_toml(file) {
             if stream.is_some() || *stated != Stated::default() {
-                let found = "statements about the log beside a run.toml (rate, units, site, sensor, stream)";
-                let advice = "Write them into run.toml, or omit them.";
+                let found = "options that describe a log, given with a run.toml (rate, units, site, sensor, stream)";
+                let advice = "Write these statements into run.toml, or omit the options.";
                 let expected = "all statements in run.toml";
                 return Err(FileError::of(file, found, expected, advice));
             }

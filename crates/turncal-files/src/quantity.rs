@@ -16,7 +16,7 @@ pub const OUTPUTS: [Output; 3] = [Output::Pulse, Output::Increment, Output::Rate
 pub enum Of {
     /// A triad's rows.
     Rows(Sensor, Output),
-    /// Anything.
+    /// A count of any quantity.
     Count,
     Time,
     Other,

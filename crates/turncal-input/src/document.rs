@@ -62,7 +62,7 @@ pub struct Document<'a> {
 }
 
 impl<'a> Document<'a> {
-    /// Of a file with this text.
+    /// The document of a file with this text.
     pub fn of(file: &'a Path, text: &'a str) -> Self {
         Self { file, text }
     }

@@ -139,7 +139,7 @@ impl FileError {
         }
     }
 
-    /// The same for the whole file.
+    /// An error about the whole file.
     pub fn of(
         file: &Path,
         found: impl fmt::Display,

@@ -17,7 +17,7 @@ pub use wander::Wander;
 pub enum TimeUnit {
     /// Number per second.
     PerSecond(f64),
-    /// Samples are counted.
+    /// A counter of samples.
     Count,
 }
 
@@ -46,7 +46,7 @@ pub enum Breaks {
 /// Time settings of a log in `run.toml`.
 #[derive(Debug, Clone, Copy)]
 pub struct Clock<'a> {
-    /// `None` if rows are simply consecutive.
+    /// Time column; `None` if rows are simply consecutive.
     pub column: Option<&'a str>,
     /// A nanosecond column in addition to one of whole seconds.
     pub nanoseconds: Option<&'a str>,

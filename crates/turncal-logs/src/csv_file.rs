@@ -113,11 +113,11 @@ fn not_rows(file: &DataFile, lines: &Lines) -> Option<FileError> {
     let (found, advice) = match first.first()? {
         b'{' => (
             "JSON",
-            "Give a log. A calibration is shown by turncal show FILE.",
+            "Give a log. To show a calibration, run turncal show FILE.",
         ),
         0 => (
             "NUL bytes at its beginning",
-            "The log was not written, or its memory was erased: copy it again.",
+            "The log was not written, or its memory was erased: copy the log again.",
         ),
         _ => return None,
     };

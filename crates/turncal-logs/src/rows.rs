@@ -51,10 +51,10 @@ pub trait Rows {
     /// Line number of a text, or sample number of another file.
     fn line(&self) -> u64;
 
-    /// The place of the row or of a column in it …
+    /// The place of the row, or of a column in the row.
     fn place(&self, column: Option<usize>) -> Place;
 
-    /// … and of the names.
+    /// The place of the column names.
     fn place_of_names(&self) -> Place {
         Place::File
     }
@@ -108,7 +108,7 @@ impl LogRows {
         Ok(place)
     }
 
-    /// The same for a name with an optional minus, which reverses the sign of the values.
+    /// Index of a column whose name may begin with a minus, which reverses the sign of the values.
     pub fn signed_column(&mut self, name: &str) -> Result<(usize, FileColumn), FileError> {
         let literal = self.header().iter().any(|known| known == name);
         let bare = name.strip_prefix('-').filter(|_| !literal);

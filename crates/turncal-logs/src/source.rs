@@ -27,7 +27,7 @@ impl Source<'_> {
         }
     }
 
-    /// Opens it according to its content.
+    /// Opens the source according to its content.
     pub fn open(&self) -> Result<LogRows, FileError> {
         if let Some(table) = self.file.table() {
             return Ok(LogRows::new(table.rows()));

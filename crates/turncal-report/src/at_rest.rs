@@ -12,9 +12,9 @@ pub fn document(at_rest: &AtRest, run: &Run, calibration: &Calibration) -> Docum
     let (outputs, thermal) = (&at_rest.outputs, &at_rest.thermal);
     let range = thermal.model.range.gyro;
     document.lead.push(format!(
-        "Run {name} stays in one attitude for {:.0} s while its temperature covers {:.1} to {:.1} °C. It can show \
-         only bias against temperature; the accelerometer values also contain the scale-factor error times gravity \
-         in this attitude.",
+        "Run {name} stays in one attitude for {:.0} s while its temperature covers {:.1} to {:.1} °C. Such a recording \
+         can show only bias against temperature; the accelerometer values also contain the scale-factor error times \
+         gravity in this attitude.",
         run.recording.imu.duration(),
         range.lowest,
         range.highest
@@ -32,7 +32,7 @@ pub fn document(at_rest: &AtRest, run: &Run, calibration: &Calibration) -> Docum
     document
 }
 
-/// What the polynomials leave, separately for heating and cooling.
+/// Residuals of the polynomials, separately for heating and cooling.
 fn residuals(at_rest: &AtRest) -> Plot {
     let form = at_rest.outputs.form();
     let panel = |(bias, means): &(usize, Vec<MeanAtRest>)| {

@@ -117,7 +117,7 @@ impl Document {
         self.add(true, block.into());
     }
 
-    /// The same for several blocks.
+    /// Adds several blocks.
     pub fn pages(&mut self, blocks: impl IntoIterator<Item = impl Into<Block>>) {
         blocks.into_iter().for_each(|block| self.page(block));
     }
@@ -202,7 +202,7 @@ impl Table {
         self
     }
 
-    /// The same for several sections.
+    /// Adds several sections.
     pub fn sections(
         self,
         sections: impl IntoIterator<Item = impl IntoIterator<Item = Vec<String>>>,

@@ -26,7 +26,7 @@ pub struct Report<'a> {
     pub name: &'a str,
     /// Instrument, table and site in words.
     pub with: &'a str,
-    /// Each move in words.
+    /// All moves in words.
     pub moves: &'a [String],
     /// Expected results.
     pub evaluation: &'a Evaluation,
@@ -309,7 +309,7 @@ pub fn in_words(study: &PathStudy) -> String {
     )
 }
 
-/// Each move of a scenario in words.
+/// All moves of a scenario in words.
 pub fn moves_in_words(scenario: &Scenario) -> Vec<String> {
     let degrees = |angle: f64| format!("{:+.0}°", angle / DEGREE).replace('-', "−");
     match &scenario.path.moves {

@@ -99,7 +99,7 @@ fn cell(calibration: &Calibration, name: &str, size: f64) -> String {
     }
 }
 
-/// What of each triad is determined, such as `gyros: D only; accelerometers: 9 of 9`.
+/// Determined values of each triad, such as `gyros: D only; accelerometers: 9 of 9`.
 pub fn determined(calibration: &Calibration) -> String {
     let of_triad = |sensor: Sensor| {
         let kinds = [("scale", "K"), ("installation", "E"), ("bias", "D")];

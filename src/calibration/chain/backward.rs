@@ -1,4 +1,4 @@
-//! The disturbance smoother through the chain: what all data say of every disturbance.
+//! The disturbance smoother through the chain: every disturbance, given all data.
 //!
 //! Source: Koopman and Shephard 1992, "Exact score for time series models in state space form", Biometrika 79(4), for
 //! the score; de Jong 1991, "The diffuse Kalman filter", Annals of Statistics 19(2), for the columns of the constants.
@@ -20,15 +20,15 @@ pub struct Moments {
     pub slope: f64,
     /// Expected curvature of −2 ln L with respect to the logarithm of its σ, from this event alone.
     pub curvature: f64,
-    /// Sum of the squared means of the disturbances over their variance, …
+    /// Sum of the squared means of the disturbances, over their prior variance.
     pub squares: f64,
-    /// … that of their variances given all data, likewise, …
+    /// Sum of the variances of the disturbances given all data, over their prior variance.
     pub unknown: f64,
-    /// … and their number.
+    /// Number of disturbances.
     pub count: f64,
 }
 
-/// What all data say of the disturbances of each event of each effect.
+/// Moments of the disturbances of each event of each effect, given all data.
 pub struct Smoothed(pub BTreeMap<(Effect, usize), Moments>);
 
 /// Smoothing cumulants: mean given zero constants, effect of the constants, and precision.
@@ -39,7 +39,7 @@ pub struct Cumulants {
 }
 
 impl Cumulants {
-    /// Before the rows of a link.
+    /// Goes back over the rows of a link.
     fn observe(&mut self, passed: &Passed) {
         let Passed { rows, across, .. } = passed;
         // (I − K H)ᵀ r = r − Hᵀ L⁻ᵀ (L⁻¹ H P) r
@@ -52,7 +52,7 @@ impl Cumulants {
         self.precision = back(&half.transpose()) + rows.tr_mul(rows);
     }
 
-    /// Before a transition.
+    /// Goes back over a transition.
     fn carry(&mut self, transition: &DMatrix<f64>) {
         self.mean = transition.tr_mul(&self.mean);
         self.by_constants = transition.tr_mul(&self.by_constants);
@@ -61,7 +61,7 @@ impl Cumulants {
 }
 
 impl Filtered<'_> {
-    /// Goes backward; `visit` sees the number of each link with the cumulants of its rows and all later ones.
+    /// Goes backward; `visit` gets the number of each link with the cumulants of its rows and all later rows.
     pub fn backward(&self, mut visit: impl FnMut(usize, &Cumulants)) {
         let (n, c) = (self.chain.states.count, self.chain.constants.len());
         let mut cumulants = Cumulants {
@@ -122,7 +122,7 @@ impl Filtered<'_> {
 pub struct SmoothedStates {
     pub mean: DVector<f64>,
     pub covariance: DMatrix<f64>,
-    /// Covariance of the constants (rows) with them.
+    /// Covariance of the constants (rows) with the states.
     pub with_constants: DMatrix<f64>,
 }
 
@@ -140,7 +140,7 @@ impl SmoothedStates {
 }
 
 impl Filtered<'_> {
-    /// The states where parts begin, given all data, of those links that are wanted, in order.
+    /// The states at the begin of the part of each requested link, given all data, in order.
     pub fn states<'a>(
         &'a self,
         posterior: &Posterior,

@@ -11,7 +11,7 @@ use crate::navigation::{Block, ErrorVector};
 /// Number of rates and specific forces that are constant in a part of a dwell.
 pub const CONSTANTS: usize = 6;
 
-/// Which states and constants there are, and how the instrument is mounted in a recording.
+/// The states and constants of a problem, and the mounting of the instrument in a recording.
 pub struct Dynamics<'a> {
     pub states: &'a States,
     pub constants: &'a [Constant],
@@ -54,7 +54,7 @@ impl Dynamics<'_> {
         by
     }
 
-    /// The same per constant.
+    /// Navigation errors at the end of a block per constant, one column each.
     pub fn by_constants(&self, block: &Block) -> DMatrix<f64> {
         let mut by = DMatrix::zeros(NAVIGATION, self.constants.len());
         for (k, &constant) in self.constants.iter().enumerate() {

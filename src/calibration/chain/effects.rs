@@ -1,11 +1,11 @@
-//! Effects: what drives the chain, and the sizes that scale it.
+//! Effects that drive the chain, and the sizes that scale them.
 
 use std::collections::BTreeMap;
 
 use crate::calibration::budget::source::BudgetSource;
 use crate::calibration::{Group, Problem, Source};
 
-/// What drives the states of the chain.
+/// An effect that drives the states of the chain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Effect {
     /// Noise whose size is estimated.
@@ -14,11 +14,11 @@ pub enum Effect {
     Difference(Group),
     /// A turn in a move that stays from then on.
     Slip(Slip),
-    /// Something of a stated size.
+    /// An effect of stated size.
     Stated(BudgetSource),
 }
 
-/// What slips in a move.
+/// The part that slips in a move.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Slip {
     /// The instrument on the table.
@@ -91,7 +91,7 @@ impl Sizes {
         self.events.iter().map(|(&event, &factor)| (event, factor))
     }
 
-    /// A copy with every effect as the links were made.
+    /// A copy in which every effect has the size with which the links were made.
     pub fn of_events_alone(&self) -> Self {
         Self {
             effects: BTreeMap::new(),
@@ -102,8 +102,8 @@ impl Sizes {
 
 /// Variance of the noise at rest in each dwell over that of all.
 ///
-/// A dwell that is less still than the others then makes no noise of them: with an inverse-gamma prior of its variance
-/// its noise is a draw from Student's t (Lange, Little, Taylor 1989, J. Am. Stat. Assoc. 84(408)).
+/// A dwell with more motion than the others then does not raise their noise: with an inverse-gamma prior of the
+/// variance, the noise of a dwell is a draw from Student's t (Lange, Little, Taylor 1989, J. Am. Stat. Assoc. 84(408)).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dispersion(Vec<f64>);
 
@@ -113,7 +113,7 @@ impl Dispersion {
         Self(vec![1.0; problem.dwells().count()])
     }
 
-    /// With these factors, over that of the middle dwell, which is returned too.
+    /// Dispersion from these factors, divided by the factor of the median dwell, which is also returned.
     pub fn of_dwells(mut factors: Vec<f64>) -> (Self, f64) {
         let middle = crate::statistics::median(&mut factors.clone()).unwrap_or(1.0);
         factors.iter_mut().for_each(|factor| *factor /= middle);

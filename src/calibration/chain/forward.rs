@@ -20,11 +20,11 @@ pub struct Passed {
     pub covariance: DMatrix<f64>,
     /// `H P`, whitened.
     pub across: DMatrix<f64>,
-    /// Rows of the states, whitened by the innovations' covariance …
+    /// Coefficients of the states in the whitened innovations.
     pub rows: DMatrix<f64>,
-    /// … of the constants, …
+    /// Coefficients of the constants in the whitened innovations.
     pub of_constants: DMatrix<f64>,
-    /// … and what they say.
+    /// Whitened innovations.
     pub innovations: DVector<f64>,
 }
 
@@ -62,7 +62,7 @@ impl Chain {
         })
     }
 
-    /// What a filter with these sizes learns of the constants, from links that are not kept.
+    /// Information on the constants from a filter with these sizes, whose links are not kept.
     ///
     /// # Errors
     /// [`CalibrationError::Diverged`] if a part cannot be reduced, or a covariance is not positive definite.
@@ -86,7 +86,7 @@ impl Chain {
 }
 
 impl Forward {
-    /// Before the first link.
+    /// The filter before the first link.
     fn new(states: usize, constants: usize) -> Self {
         Self {
             mean: DVector::zeros(states),
@@ -157,7 +157,7 @@ impl Passed {
 }
 
 impl Filtered<'_> {
-    /// What all rows say of the constants, with their prior.
+    /// Information of all rows and the prior on the constants.
     pub fn known(&self, prior: &Prior) -> Known {
         let c = self.chain.constants.len();
         let mut known = Known::new(prior.clone());
@@ -177,7 +177,7 @@ impl Filtered<'_> {
         known
     }
 
-    /// The posterior of the constants, from what is known of them; `None` if something is undetermined.
+    /// The posterior of the constants from the information on them; `None` if a constant is undetermined.
     pub fn posterior_with(&self, known: &Known, sites: &Sites) -> Option<Posterior> {
         let of_rows = known.with(sites)?;
         Some(Posterior {

@@ -1,4 +1,4 @@
-//! Innovations of single observations, and the estimate against time: what the filter knows as the table moves.
+//! Innovations of single observations, and the estimate against time, as known to the filter while the table moves.
 
 use nalgebra::{DMatrix, DVector, Matrix3, SymmetricEigen};
 
@@ -23,8 +23,8 @@ struct Expected {
 }
 
 impl Filtered<'_> {
-    /// Innovations of all observations, each given those before it, and the estimate after parts of dwells. The
-    /// constants that may be absent are known beforehand as their sites say.
+    /// Innovations of all observations, each given those before it, and the estimate after parts of dwells. The sites
+    /// give the prior of the constants that may be absent.
     ///
     /// # Errors
     /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
@@ -71,7 +71,7 @@ impl Filtered<'_> {
         Ok((innovations, epochs))
     }
 
-    /// What a part is given, from all before it.
+    /// Quantities given to a part, from all rows before it.
     fn expected(&self, number: usize, known: &Known) -> Expected {
         let (link, passed) = (&self.chain.links[number], &self.passed[number]);
         let given = &link.given;

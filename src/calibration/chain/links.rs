@@ -23,14 +23,14 @@ pub struct Chain {
     pub observations: usize,
     /// 1σ of the slip in one move over that of a position.
     pub slip: f64,
-    /// Sum of squares of the observations within parts that depends on nothing else …
+    /// Sum of squares of the observations within parts that does not depend on states or constants.
     pub squares: f64,
-    /// … and logarithm of the determinant of their covariance.
+    /// Logarithm of the determinant of the covariance of the observations within parts.
     pub log_determinant: f64,
 }
 
 impl Chain {
-    /// The same without the rows of some dwells, given by number.
+    /// A copy without the rows of some dwells, given by number.
     pub fn observed_in(mut self, used: impl Fn(usize) -> bool) -> Self {
         let (n, c) = (self.states.count, self.constants.len());
         for link in self.links.iter_mut().filter(|link| !used(link.dwell)) {

@@ -1,4 +1,4 @@
-//! The chain of dwells: what the parts of dwells say, and what moves do between them.
+//! The chain of dwells: information from the parts of dwells, and the moves between them.
 //!
 //! Within a part of a dwell the noise at rest alone acts; [`links`] reduces each part once to rows of what it begins
 //! with and of the constants. Between parts the states go on through moves, table positions, and biases that vary: a

@@ -1,9 +1,10 @@
-//! Reduction of a part of a dwell, by the noise at rest alone, to what it says of what it begins with.
+//! Reduction of a part of a dwell, with the noise at rest alone, to whitened rows of the states at its begin.
 //!
 //! At rest the parameters act through three constant rates and three constant specific forces. Given these and the
 //! states at the begin (together `g`), only noise remains, which a filter of the moving states whitens in each
-//! observation. The whitened observations are linear in `g`, and so are the states at the end: together they are all
-//! that the part says (Friedland 1969, "Treatment of bias in recursive filtering", IEEE Trans. Automatic Control 14(4)).
+//! observation. The whitened observations and the states at the end are linear in `g`: together they contain all
+//! information of the part (Friedland 1969, "Treatment of bias in recursive filtering", IEEE Trans. Automatic Control
+//! 14(4)).
 //!
 //! Beside the navigation errors an attitude is observed: by hand, the rotation since the body came to rest; after a move
 //! of a table, the attitude error less the settling of the table, which fades.
@@ -20,15 +21,15 @@ use crate::calibration::{BudgetSource, Model, Observation, Stretch};
 use crate::navigation::Block;
 use course::{Course, Gain, StepModel};
 
-/// What a part of a dwell says.
+/// The information in a part of a dwell.
 pub struct Part {
-    /// Rows of `g` …
+    /// Rows of `g`.
     pub measured: DMatrix<f64>,
-    /// … and their measured values, of σ 1.
+    /// Measured values of these rows, with σ = 1.
     pub values: DVector<f64>,
-    /// Sum of squares of the observations that is independent of `g` …
+    /// Sum of squares of the observations that is independent of `g`.
     pub squares: f64,
-    /// … and logarithm of the determinant of their covariance.
+    /// Logarithm of the determinant of the covariance of the observations.
     pub log_determinant: f64,
     /// Number of scalars that were observed.
     pub count: usize,
@@ -55,11 +56,11 @@ impl Part {
 pub struct Whitened<'a> {
     /// Number among those of the part.
     pub number: usize,
-    /// Three scalars of σ 1, given `g = 0` …
+    /// Three scalars with σ = 1, given `g = 0`.
     pub scalars: Vector3<f64>,
-    /// … the lower triangular root of the covariance of the three components …
+    /// Lower triangular root of the covariance of the three components.
     pub root: &'a Matrix3<f64>,
-    /// … and their rows of `g`, one after the other.
+    /// Rows of `g` of the three scalars, one after the other.
     pub rows: &'a [f64],
 }
 
@@ -91,7 +92,7 @@ pub fn part_filters(moving: usize) -> [Box<dyn PartFilter>; 2] {
     }
 }
 
-/// Which of the two filters a part has.
+/// Index of the filter of a part.
 pub fn filter_of(rest: &Rest) -> usize {
     usize::from(!(rest.first && rest.new_position))
 }
@@ -176,7 +177,7 @@ impl<const M: usize, const G: usize> Course<M, G> {
     }
 }
 
-/// What the observations of a part say so far.
+/// Information from the observations of a part so far.
 struct Said<const M: usize, const G: usize> {
     /// Mean of the moving states, given `g = 0`.
     mean: [f64; M],

@@ -1,4 +1,4 @@
-//! What each move tells of the constants.
+//! The information of each move on the constants.
 
 use nalgebra::DMatrix;
 

@@ -15,7 +15,7 @@ use crate::number::three_digits;
 use crate::statistics::FALSE_ALARM;
 use crate::units::{ARCSEC, DEG_PER_H, MICRO_G};
 
-/// What stands out.
+/// Kind of an unusual event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum EventKind {
     /// The table's readings in one dwell.
@@ -30,24 +30,24 @@ pub enum EventKind {
     Slip(Slip),
 }
 
-/// An event beyond what its effect, with its heavy tails, makes by chance.
+/// An event larger than its effect, with heavy tails, produces by chance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Event {
     /// Kind.
     pub kind: EventKind,
-    /// Number of the dwell that it concerns or precedes, from zero.
+    /// Number, from zero, of the dwell that the event concerns or precedes.
     pub dwell: usize,
     /// End of the first part of that dwell, s.
     pub time: f64,
     /// Size, in rad, m/s, rad/s or m/s².
     pub size: f64,
-    /// −2 ln of the p-value, and its limit.
+    /// −2 ln of the p-value.
     pub significance: f64,
     /// The limit of the significance at a false-alarm rate of 0.1 % over all events.
     pub limit: f64,
 }
 
-/// What all data say of an event.
+/// Evidence of all data for an event.
 struct Told {
     time: f64,
     /// Sum of the squared mean disturbances of the event.
@@ -93,7 +93,7 @@ impl Event {
         events
     }
 
-    /// The finding on it: kind, time and treatment.
+    /// The finding on the event: kind, time and treatment.
     pub fn finding(&self) -> Finding {
         let Self {
             time,
@@ -114,7 +114,7 @@ impl Event {
     }
 }
 
-/// What all data say of the events of effects with heavy tails.
+/// Evidence of all data for the events of effects with heavy tails.
 fn told(of: &Weighed) -> BTreeMap<(Effect, usize), Told> {
     let (filtered, posterior) = (&of.filtered, &of.posterior);
     let mut all = BTreeMap::<(Effect, usize), Told>::new();

@@ -21,7 +21,7 @@ pub enum Observation {
 }
 
 impl Observation {
-    /// All of them.
+    /// All kinds.
     pub const ALL: [Self; 3] = [Self::Velocity, Self::Table, Self::Attitude];
 
     /// Name.
@@ -51,11 +51,11 @@ pub struct Innovation {
     pub observation: Observation,
     /// East, North and Up in units of their own σ, independent of each other.
     pub whitened: [f64; 3],
-    /// These σ, rad or m/s.
+    /// σ of the three components, rad or m/s.
     pub sigma: [f64; 3],
     /// Number of its dwell.
     pub dwell: usize,
-    /// Whether it shows the errors of the move before its dwell; false if rows are missing in between.
+    /// Whether the innovation shows the errors of the move before its dwell; false if rows are missing in between.
     pub after_move: bool,
 }
 
@@ -136,8 +136,8 @@ fn over_dwells(innovations: &[&Innovation]) -> Vec<f64> {
     summed.collect()
 }
 
-/// The finding on innovations that do not agree with their covariance, if any. `pulses`: the kinds of observation in
-/// which remainders of pulses are.
+/// The finding on innovations that do not agree with their covariance, if any. `pulses`: the kinds of observation that
+/// contain remainders of pulses.
 pub fn inconsistent(innovations: &[Innovation], pulses: &[Observation]) -> Option<Finding> {
     let of = |kind| innovations.iter().filter(move |i| i.observation == kind);
     let kinds = Observation::ALL.map(|kind| (kind, of(kind).collect::<Vec<_>>()));

@@ -229,7 +229,7 @@ mod tests {
     use crate::run::Run;
     use crate::simulation::Scenario;
 
-    /// What is found in a run of triads with this sensitivity, which are known to a part of the prior's σ.
+    /// The finding for a run of triads with this sensitivity, known to a fraction of the prior σ.
     fn found_in(run: &Run, sensitivity: PerSensor<Matrix3<f64>>) -> Option<Finding> {
         let model = Model::new(run, &Options::default());
         let triads = PerSensor::from_fn(|sensor| {

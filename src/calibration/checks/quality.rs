@@ -61,8 +61,8 @@ pub struct Residuals {
 }
 
 impl Residuals {
-    /// Medians of the magnitudes of those of gravity over gravity, and of those of directions over a turn; `None` if there
-    /// are none.
+    /// Medians of the magnitudes: gravity residuals as a fraction of gravity, and direction residuals as a fraction of
+    /// a turn; `None` without residuals.
     pub fn middle(&self) -> [Option<f64>; 2] {
         let gravity = self
             .dwells
@@ -115,11 +115,11 @@ pub struct Measures {
 /// Statistics of the deviations of one kind.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Spread {
-    /// Their number; if zero, the other figures are also zero.
+    /// Number of deviations; if zero, the other figures are also zero.
     pub count: usize,
-    /// Their root mean square.
+    /// Root mean square of the deviations.
     pub rms: f64,
-    /// The largest magnitude.
+    /// The largest magnitude of a deviation.
     pub largest: f64,
 }
 

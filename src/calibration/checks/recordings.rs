@@ -15,9 +15,9 @@ pub struct RecordingDifference {
     pub stated: f64,
     /// 1σ estimated from the recordings, in its unit.
     pub found: f64,
-    /// −2 ln of the likelihood ratio of the stated to the estimated σ …
+    /// −2 ln of the likelihood ratio of the stated to the estimated σ.
     pub ratio: f64,
-    /// … and its limit at this group's share of the false-alarm rate.
+    /// Limit of the ratio at this group's share of the false-alarm rate.
     pub limit: f64,
 }
 
@@ -45,7 +45,7 @@ impl RecordingDifference {
     }
 }
 
-/// The finding on differences that were estimated and are used, if there are any.
+/// The finding on estimated differences, if there are any.
 pub fn recordings_differ(differences: &[RecordingDifference]) -> Option<Finding> {
     let one =
         |of: &RecordingDifference| format!("{} = {:.2e} (stated {})", of.key, of.found, of.stated);

@@ -16,6 +16,8 @@ use crate::statistics::FALSE_ALARM;
 /// Largest error of the difference of two neighbouring increments by pulses: a second difference of remainders, each
 /// half a pulse at most.
 const PULSES: f64 = 2.0;
+/// A scatter smaller than this part of the stated noise is shown as zero.
+const NO_NOISE: f64 = 1e-3;
 
 /// Findings on triads with a scatter at rest that does not agree with the noise that the user insists on. Calibrated
 /// inputs are used, because a wrong prior scale factor is not noise.
@@ -73,11 +75,7 @@ fn of_triad<'a>(
     let (figure, unit) = NoiseKeys::of(sensor).random_walk;
     let [found, stated] = [variance, expected].map(|of| (of / (2.0 * step)).sqrt() / unit);
     let ratio = found / stated;
-    let compared = match ratio {
-        ..1.0 => format!("{:.1} % below", 100.0 * (1.0 - ratio)),
-        1.0..2.0 => format!("{:.1} % above", 100.0 * (ratio - 1.0)),
-        _ => format!("{ratio:.1} times"),
-    };
+    let (compared, shown) = compared(found, ratio);
     let beyond = variance > high * most || variance < low * least;
     let [low, high] = [low.sqrt(), high.sqrt()];
     let symbol = match sensor {
@@ -89,7 +87,7 @@ fn of_triad<'a>(
          The estimate uses 0.1 s averages, so vibration of the mount raises it too. Run turncal allan on a long static \
          recording to separate noise from vibration, and correct {figure}.",
         triad_name(sensor),
-        three_digits(found),
+        shown,
         three_digits(stated),
         100.0 * (1.0 - low),
         100.0 * (high - 1.0)
@@ -98,6 +96,17 @@ fn of_triad<'a>(
         "of": sensor.name(), "figure": figure, "found": found, "stated": stated, "limits": [low, high]
     });
     beyond.then(|| Finding::new(Kind::ScatterAtRest, text, figures).of_growth(ratio))
+}
+
+/// The estimated figure relative to the stated one, in words, and the figure.
+fn compared(found: f64, ratio: f64) -> (String, String) {
+    let shown = three_digits(found);
+    match ratio {
+        ..NO_NOISE => ("far below".to_owned(), "practically 0".to_owned()),
+        ..1.0 => (format!("{:.1} % below", 100.0 * (1.0 - ratio)), shown),
+        1.0..2.0 => (format!("{:.1} % above", 100.0 * (ratio - 1.0)), shown),
+        _ => (format!("{ratio:.1} times"), shown),
+    }
 }
 
 #[cfg(test)]

@@ -65,7 +65,7 @@ pub fn rounded(
     Sensor::ALL.into_iter().filter_map(of).collect()
 }
 
-/// The same of one triad; `None` if rows are not rounded.
+/// Rounding errors of one triad; `None` if rows are not rounded.
 fn of_triad(
     problem: &Problem,
     sensor: Sensor,

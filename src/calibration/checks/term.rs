@@ -1,4 +1,4 @@
-//! Evidence for error terms, and the findings on those that are there and those that a path does not show.
+//! Evidence for error terms, and the findings on terms that are present and terms that a path does not show.
 
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -13,7 +13,7 @@ use crate::statistics::FALSE_ALARM;
 /// A term that a path does not show is named if it widens the σ of a group by more than this.
 const NAMED: f64 = 1.25;
 
-/// Whether one of this many candidates, absent with this probability, is named as there.
+/// Whether a candidate, absent with this probability, counts as present among this many candidates.
 pub fn is_shown(absent: f64, candidates: usize) -> bool {
     absent < FALSE_ALARM / candidates.max(1) as f64
 }
@@ -23,18 +23,19 @@ pub fn is_shown(absent: f64, candidates: usize) -> bool {
 pub struct TermEvidence {
     /// The error term.
     pub term: ErrorTerm,
-    /// Probability that it is there; one if it is stated or asked for.
+    /// Probability that the term is present; one if the term is stated or requested.
     pub present: f64,
-    /// Whether it is there beyond doubt although nobody asked for it: one false alarm in a thousand recordings.
+    /// Whether the data show the term although it was not requested (false-alarm rate 1 in 1000 recordings).
     pub shown: bool,
     /// Largest remaining part of its usual size: from 0 (known) to 1 (not shown by the recording).
     pub remaining: f64,
-    /// RMS σ of each of [`Group::all`] with it, divided by that if it were known to be absent; `None` if the group has no σ.
+    /// RMS σ of each of [`Group::all`] with the term, divided by RMS σ if the term were known to be absent; `None` if
+    /// the group has no σ.
     pub sigma_factors: [Option<f64>; 6],
 }
 
 impl TermEvidence {
-    /// Of every term that may be there.
+    /// The evidence for every term that may be present.
     pub(in crate::calibration) fn all(
         of: &Weighed,
         candidates: &Candidates,
@@ -118,7 +119,7 @@ impl TermEvidence {
         Some(Finding::new(Kind::TermNotShown, text, figures))
     }
 
-    /// The group whose σ it widens most.
+    /// The group whose σ the term widens most.
     pub fn widest(&self) -> Option<(Group, f64)> {
         let groups = Group::all().zip(self.sigma_factors);
         let groups = groups.filter_map(|(group, factor)| Some((group, factor?)));

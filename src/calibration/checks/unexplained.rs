@@ -37,8 +37,8 @@ pub fn not_converged(outcome: &Outcome) -> Option<Finding> {
     (!outcome.converged).then(|| Finding::new(Kind::NotConverged, text, figures))
 }
 
-/// The finding, if residuals are absurd for any sensor, whatever explains them: half of the dwells or moves are off by
-/// more than a hundredth of gravity or of a turn.
+/// The finding, if residuals are too large for any sensor: in half of the dwells or moves they exceed a hundredth of
+/// gravity or of a turn.
 pub fn absurd(problem: &Problem, outcome: &Outcome) -> Option<Finding> {
     let residuals = outcome.residuals(problem).ok()?;
     let names = [
@@ -65,7 +65,7 @@ pub fn unexplained(all: &Nis, innovations: &[Innovation]) -> Option<Finding> {
     rejected("NIS", all.mean, worst.0)
 }
 
-/// The same for a closed form, from the findings on its residuals.
+/// The finding for a closed form, from the findings on its residuals.
 pub fn unexplained_residuals(findings: &[Finding]) -> Option<Finding> {
     let large = |finding: &&Finding| finding.is(Kind::ResidualsLarge);
     findings.iter().filter(large).find_map(|finding| {

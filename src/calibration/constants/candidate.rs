@@ -10,14 +10,14 @@ use crate::turntable::AXIS_ERRORS;
 pub enum Candidate {
     /// An error term, or several that have the same effect on most paths.
     Term(ErrorTerm),
-    /// A latitude that is not the stated one.
+    /// A latitude that differs from the stated one.
     EarthRate,
     /// A function of temperature in all parameters of a kind.
     Order(Sensor, ParameterKind, usize),
 }
 
 impl Candidate {
-    /// The candidate to which a constant belongs; `None` if it is known to be there.
+    /// The candidate to which a constant belongs; `None` if the constant is certain.
     pub fn of(constant: Constant, model: &Model) -> Option<Self> {
         match constant {
             Constant::EarthRate(_) => Some(Self::EarthRate),

@@ -16,14 +16,14 @@ pub struct Known {
     root: DMatrix<f64>,
 }
 
-/// What is known of constants: the logarithm of its density is `−½ xᵀ matrix x + xᵀ vector` up to a constant.
+/// Information on constants: the logarithm of their density is `−½ xᵀ matrix x + xᵀ vector` up to a constant.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Information {
     pub matrix: DMatrix<f64>,
     pub vector: DVector<f64>,
 }
 
-/// Normal priors of the constants that may be absent, and what averages over several add to their covariance.
+/// Normal priors of the constants that may be absent, and the covariance that averaging over several cases adds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sites {
     pub information: Information,
@@ -67,7 +67,7 @@ impl Known {
         self.root = triangle(&with);
     }
 
-    /// What the rows say of the constants that may be absent, whatever all others are.
+    /// Information of the rows on the constants that may be absent, with all others marginalised.
     pub fn of_candidates(&self) -> Information {
         let (n, m) = (self.open.len(), self.prior.candidates);
         let root = self.root.view((n - m, n - m), (m, m));
@@ -185,7 +185,7 @@ impl Known {
 }
 
 impl Sites {
-    /// All known where the prior has them, to a millionth of their usual size.
+    /// All constants known at their prior mean, to a millionth of their usual size.
     pub fn certain(prior: &Prior) -> Self {
         let (n, m) = (prior.sigma.len(), prior.candidates);
         let information = prior
@@ -198,7 +198,7 @@ impl Sites {
         })
     }
 
-    /// Nothing in addition to the rows.
+    /// Priors that add nothing to the rows.
     pub fn none(prior: &Prior) -> Self {
         let m = prior.candidates;
         Self::of(Information {
@@ -214,7 +214,7 @@ impl Sites {
         }
     }
 
-    /// Without what is between the cases.
+    /// A copy without the covariance between the cases.
     pub fn within(self) -> Self {
         Self::of(self.information)
     }

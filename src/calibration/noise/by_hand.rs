@@ -20,9 +20,9 @@ pub type Parts = [DVector<f64>; BY_HAND.len()];
 
 /// Additional noise that makes the errors more likely than the stated noise.
 ///
-/// It is found by maximum likelihood, with the parameters integrated out with their prior. With few more equations than
-/// parameters, residuals would not show it, because parameter values that are unlikely under the prior can explain any
-/// noise.
+/// The noise is found by maximum likelihood, with the parameters integrated out with their prior. With few more
+/// equations than parameters, residuals would not show the noise, because parameter values that are unlikely under the
+/// prior can explain any noise.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ByHand {
     found: Vec<Component>,

@@ -1,4 +1,4 @@
-//! Sources of noise, what is stated of them and what a recording shows.
+//! Sources of noise: stated sizes, and sizes estimated from a recording.
 
 mod by_hand;
 mod likelihood_ratio;

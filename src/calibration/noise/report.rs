@@ -16,7 +16,7 @@ use crate::number::three_digits;
 pub struct NoiseReport {
     /// The requested policy.
     pub policy: NoisePolicy,
-    /// Whether the noise was estimated; if not, it is as stated.
+    /// Whether the noise was estimated; otherwise it is as stated.
     pub learnt: bool,
     /// The test of the stated noise; `None` if nothing was tested.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -29,10 +29,10 @@ pub struct NoiseReport {
 /// The test of the stated noise against the estimated noise.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct NoiseTest {
-    /// The largest squared distance of a stated figure from the estimate, in logarithms and their σ …
+    /// The largest squared distance of a stated figure from the estimate, in logarithms and their σ.
     #[serde(default)]
     pub ratio: f64,
-    /// … and its limit for correct stated noise (χ², p < 0.001 over all figures).
+    /// Limit of the squared distance for correct stated noise (χ², p < 0.001 over all figures).
     #[serde(rename = "ratio_limit")]
     pub limit: f64,
     /// Whether a stated figure is too small by more than half beyond this limit.
@@ -147,7 +147,7 @@ fn symbol(unit: &str) -> String {
     })
 }
 
-/// A stated figure is named if the recording shows more than this times as much.
+/// A finding names a stated figure if the estimate is more than this many times as large.
 pub const NAMED: f64 = 1.5;
 
 /// The finding on estimated noise: the squared distance of the worst stated figure, and its limit. `None` if no noise was
@@ -182,7 +182,7 @@ fn noise_learnt(
 }
 
 impl SourceFigures {
-    /// The line of `run.toml` that states it.
+    /// The line of `run.toml` that states the estimated value.
     fn line(&self) -> String {
         let (_, (name, unit)) = self.source.stated_in();
         let value = self.used * self.source.unit().1 / unit;

@@ -10,7 +10,7 @@ use crate::turntable::{AXIS_ERRORS, AxisError, TABLE_GEOMETRY, table_geometry_na
 
 /// Number of parameters of both kinds.
 pub const AUXILIARY: usize = TABLE_GEOMETRY + TERM_PARAMETERS;
-/// A vector of them: table (see [`crate::turntable::TableGeometry`]), then terms (see [`Term`]).
+/// A vector of all auxiliary parameters: table (see [`crate::turntable::TableGeometry`]), then terms (see [`Term`]).
 pub type AuxiliaryVector = SVector<f64, AUXILIARY>;
 
 /// Index of the first table axis among the auxiliary parameters.
@@ -34,7 +34,7 @@ impl AuxiliaryKind {
         }
     }
 
-    /// The error term that it belongs to.
+    /// The error term to which the parameter belongs.
     pub fn error_term(self) -> ErrorTerm {
         match self {
             Self::Table(0..OF_AXES) => ErrorTerm::TableBase,
@@ -75,11 +75,11 @@ const INSEPARABLE: f64 = 0.99;
 pub struct Auxiliary {
     /// The estimates, rad for the table, SI for terms.
     pub values: AuxiliaryVector,
-    /// Their covariance, [`AUXILIARY`] square.
+    /// Covariance of the estimates, [`AUXILIARY`] square.
     pub covariance: DMatrix<f64>,
     /// Covariance of the parameters of both triads (rows) with them.
     pub cross: DMatrix<f64>,
-    /// 1σ of each before the run, around zero.
+    /// Prior 1σ of each, around zero.
     pub prior_sigma: AuxiliaryVector,
 }
 
@@ -133,12 +133,12 @@ impl Auxiliary {
         index.checked_sub(TABLE_GEOMETRY)
     }
 
-    /// Indices of those that were estimated.
+    /// Indices of the estimated parameters.
     pub fn estimated(&self) -> impl Iterator<Item = usize> + '_ {
         (0..AUXILIARY).filter(|&k| self.prior_sigma[k] > 0.0)
     }
 
-    /// Indices of those that the run did not observe.
+    /// Indices of the estimated parameters that the run did not observe.
     pub fn unobserved(&self) -> impl Iterator<Item = usize> + '_ {
         let sigma = self.sigma();
         self.estimated()

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::imu::Term;
 use crate::turntable::AxisError;
 
-/// An error of instrument or table that is estimated if it is on.
+/// An error of instrument or table that is estimated if switched on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ErrorTerm {
     /// Biases that vary as first-order Gauss–Markov processes.
@@ -33,7 +33,7 @@ impl ErrorTerm {
         all
     };
 
-    /// Those that are constant over a run.
+    /// Error terms that are constant over a run.
     pub fn constant() -> impl Iterator<Item = Self> {
         let all = Self::ALL.into_iter();
         all.filter(|&term| term != Self::GaussMarkovBias)
@@ -61,7 +61,7 @@ impl ErrorTerm {
         })
     }
 
-    /// Moves or dwells that show it, where a path does not.
+    /// Moves or dwells that show the term, where a path does not.
     pub fn shown_by(self) -> &'static str {
         match self {
             Self::GaussMarkovBias => "a long dwell",

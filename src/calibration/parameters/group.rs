@@ -131,7 +131,7 @@ impl Group {
             .collect()
     }
 
-    /// Indices of those that were estimated.
+    /// Indices of the estimated parameters.
     pub fn estimated(self, estimate: &Estimate) -> Vec<usize> {
         let indices = estimate.estimated();
         indices.filter(|&index| Self::of(index) == self).collect()

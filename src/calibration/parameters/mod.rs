@@ -76,7 +76,7 @@ pub fn factor(nominal: &PerSensor<Nominal>, index: usize) -> f64 {
 /// A parameter counts as observed if less than this fraction of its prior σ remains.
 pub const OBSERVED_BELOW: f64 = 0.5;
 
-/// The same triads in the general form.
+/// Both triads in the general form.
 pub fn in_general_form(triads: &PerSensor<Triad>) -> PerSensor<Triad> {
     PerSensor::from_fn(|sensor| triads.get(sensor).in_form(InstallationForm::General))
 }

@@ -18,13 +18,13 @@ const STEPS: usize = 100;
 /// A part of a dwell, modelled with one constant attitude.
 #[derive(Debug, Clone)]
 pub struct Rest {
-    /// Whether it is the first part of the dwell.
+    /// Whether this is the first part of the dwell.
     pub first: bool,
-    /// Whether the body moved before it.
+    /// Whether the body moved before this part.
     pub new_position: bool,
-    /// Computed state before its start …
+    /// Computed state before the start of the part.
     pub from: State,
-    /// … and the linearisation state.
+    /// Linearisation state at the start of the part.
     pub begin: State,
     /// Rotation of the table attitude per axis error, if the angles are known.
     pub axes: Option<Arc<AxisResponse>>,

@@ -16,14 +16,14 @@ use crate::turntable::{AxisResponse, axis_response};
 #[derive(Debug, Clone, PartialEq)]
 pub struct Step {
     pub samples: Range<usize>,
-    /// Set within a dwell.
+    /// Data of a step within a dwell; `None` in a move.
     pub at_rest: Option<AtRest>,
 }
 
 /// Data at the end of a step within a dwell.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AtRest {
-    /// Whether it is the dwell's first.
+    /// Whether this is the first step of the dwell.
     pub first: bool,
     /// Sums of its samples.
     pub sums: Sums,

@@ -70,7 +70,7 @@ impl Calibration {
         self.in_state(&thermal_state_everywhere(&thermal.range, temperature, 0.0))
     }
 
-    /// The same for these values of the functions of temperature.
+    /// The calibration for these values of the functions of temperature.
     ///
     /// # Errors
     /// If a coefficient belongs to no parameter.

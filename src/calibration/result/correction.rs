@@ -134,7 +134,7 @@ impl Correction {
         })
     }
 
-    /// A copy with a check that the record belongs to the run's instrument: units and nominal scales must agree.
+    /// The correction, with a check that the record belongs to the run's instrument: units and nominal scales must agree.
     pub fn for_run(record: &Calibration, run: &Run) -> Result<Self, CorrectionError> {
         let correction = Self::of_record(record)?;
         for sensor in Sensor::ALL {
@@ -168,12 +168,12 @@ impl Correction {
         (0..TERM_PARAMETERS).filter(|&k| self.terms[k] != 0.0)
     }
 
-    /// Whether it has a parameter of a term.
+    /// Whether the correction has a parameter of this term.
     pub fn has(&self, term: Term) -> bool {
         self.terms().any(|k| term.parameters().contains(&k))
     }
 
-    /// These samples of a run, calibrated, in sequence.
+    /// Calibrates these samples of a run, in sequence.
     ///
     /// Error terms are evaluated at the calibrated sample. The angular acceleration for the size effect is the
     /// difference of the rates before and after; it is zero if the record is not continuous. The time offset
@@ -237,7 +237,7 @@ impl Correction {
         }
     }
 
-    /// Whether it depends on temperature.
+    /// Whether the correction depends on temperature.
     pub fn changes(&self) -> bool {
         self.changing.is_some()
     }

@@ -96,7 +96,7 @@ pub struct Calibration {
     /// Number of passes over the record.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub passes: Option<usize>,
-    /// Whether it converged.
+    /// Whether the filter converged.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub converged: Option<bool>,
     /// Whether the innovations agree with their covariance.
@@ -124,7 +124,7 @@ pub struct Calibration {
     /// Cautions about using the values.
     #[serde(default)]
     pub warnings: Vec<String>,
-    /// The same in structured form: kind, text, figures.
+    /// The warnings in structured form: kind, text, figures.
     #[serde(default)]
     pub findings: Vec<Finding>,
     /// Names of parameters that were not estimated.
@@ -152,7 +152,7 @@ pub struct Calibration {
 pub struct Provenance {
     /// The program with its version.
     pub program: String,
-    /// Each file that was read, with its SHA-256, the run.toml first; empty if none was read.
+    /// Every file that was read, with its SHA-256, the run.toml first; empty if none was read.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub inputs: Vec<InputFile>,
     /// Nominal scales: the file's quantity per second for one rad/s or m/s².
@@ -269,9 +269,9 @@ pub struct NisRecord {
 pub struct BlockRecord {
     /// Name, such as `accel-second-order`.
     pub block: String,
-    /// Whether it was stated or asked for.
+    /// Whether the term was stated or requested.
     pub on: bool,
-    /// Probability that it is there.
+    /// Probability that the term is present.
     #[serde(default)]
     pub present: f64,
     /// Largest remaining part of its usual size: from 0 (known) to 1 (not shown).
@@ -328,7 +328,7 @@ impl Calibration {
         failed.or(stated)
     }
 
-    /// Names of parameters that were asked for but not determined; they keep the values and σ of before.
+    /// Names of parameters that were requested but not determined; they keep their prior values and σ.
     pub fn undetermined(&self) -> impl Iterator<Item = &String> {
         let kept = |name: &&String| self.sigma_of(name).is_some_and(|sigma| *sigma > 0.0);
         self.fixed.iter().filter(kept)

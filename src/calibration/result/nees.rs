@@ -10,7 +10,7 @@ use crate::calibration::mean_square_interval;
 /// angles represent six.
 const NO_DIRECTION: f64 = 1e-11;
 
-/// Normalised estimation error squared, as a mean of squares of independent numbers of σ 1.
+/// Normalised estimation error squared, as a mean of squares of independent numbers with σ = 1.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Nees {
     /// NEES/n.

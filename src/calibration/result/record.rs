@@ -143,8 +143,8 @@ impl ClosedForm {
 }
 
 impl AtRest {
-    /// The partial calibration that it gives: biases of the gyros to within Earth rate, and the temperature dependence
-    /// of all biases; the rest is the prior.
+    /// The partial calibration from an instrument at rest: biases of the gyros to within Earth rate, and the
+    /// temperature dependence of all biases; the rest is the prior.
     pub fn record(&self, problem: &Problem) -> Calibration {
         let run = problem.run();
         let (estimate, thermal) = self.biases(problem);

@@ -33,10 +33,10 @@ pub struct ThermalRecord {
     pub range: PerSensor<ThermalRange>,
     /// The coefficients, in the units of their parameters.
     pub coefficients: Vec<CoefficientRecord>,
-    /// Their covariance, in this order.
+    /// Covariance of the coefficients, in this order.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub covariance: Vec<Vec<f64>>,
-    /// Covariance of the calibration's `parameters` (rows) with them.
+    /// Covariance of the calibration's `parameters` (rows) with the coefficients.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub cross: Vec<Vec<f64>>,
     /// Coefficients of the powers of T − reference in K from the first on, by parameter.
@@ -86,7 +86,8 @@ pub struct ValueRecord {
 }
 
 impl CoefficientRecord {
-    /// Of a parameter of a form and a function of temperature, by their indices; `None` if there is no such parameter.
+    /// The coefficient of a parameter and a function of temperature, by their indices; `None` if the form has no such
+    /// parameter.
     fn new(
         (form, index, function): (InstallationForm, usize, usize),
         value: f64,
@@ -118,7 +119,7 @@ impl CoefficientRecord {
 }
 
 impl ThermalRecord {
-    /// Of estimates at the reference and of coefficients, in the file's quantity.
+    /// The record of estimates at the reference and of coefficients, in the file's quantity.
     pub(in crate::calibration) fn of(thermal: &Thermal, estimate: &Estimate, run: &Run) -> Self {
         let (form, nominal) = (estimate.form(), &run.instrument.nominal);
         let of = |k: usize| factor(nominal, thermal.coefficients[k].index());
@@ -147,7 +148,7 @@ impl ThermalRecord {
         }
     }
 
-    /// Of a known truth, in the file's quantity.
+    /// The record of a known truth, in the file's quantity.
     pub fn of_truth(
         range: &PerSensor<ThermalRange>,
         coefficients: &PerSensor<ThermalCoefficients>,
@@ -208,7 +209,7 @@ fn all_powers(
 }
 
 impl RecordingRecord {
-    /// Of each recording of an outcome, in the file's quantity.
+    /// The record of each recording of an outcome, in the file's quantity.
     pub(in crate::calibration) fn all(outcome: &Outcome, run: &Run) -> Vec<Self> {
         let (form, nominal) = (outcome.estimate.form(), &run.instrument.nominal);
         let named = |values: &ParameterVector, sigma: &ParameterVector| {

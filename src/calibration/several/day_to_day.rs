@@ -13,10 +13,10 @@ use crate::units::ARCSEC;
 /// Effect of a rotation of the instrument on its mounting face: derivatives of the recording's parameters.
 #[derive(Debug, Clone)]
 pub struct Turned {
-    /// With respect to the common parameters, one column each. The poorly determined mean of all mountings depends on
-    /// well-determined quantities, so the accuracy of the derivatives must match the ratio of the two.
+    /// Derivatives with respect to the common parameters, one column each. The poorly determined mean of all mountings
+    /// depends on well-determined quantities, so the accuracy of the derivatives must match the ratio of the two.
     pub by_parameters: ParameterMatrix,
-    /// With respect to the rotation about each body axis.
+    /// Derivatives with respect to the rotation about each body axis.
     pub by_mounting: SMatrix<f64, PARAMETERS, 3>,
 }
 
@@ -74,7 +74,7 @@ impl DayToDay {
         groups.chain([MOUNTING.to_owned()]).collect()
     }
 
-    /// From the values in `[day_to_day]` by key.
+    /// The differences from the values in `[day_to_day]` by key.
     pub fn of_values(value: impl Fn(&str) -> f64) -> Self {
         let mut differ = Self::default();
         for group in Group::all() {
@@ -133,7 +133,7 @@ impl Difference {
         }
     }
 
-    /// The triads of the recording.
+    /// The triads in the recording, given the common triads.
     pub fn applied(&self, common: &PerSensor<Triad>) -> PerSensor<Triad> {
         let form = common.gyro.form;
         let triads = from_vector(form, &(to_vector(common) + self.parameters));

@@ -85,7 +85,7 @@ pub struct Start {
     pub alone: Vec<SeparateEstimate>,
 }
 
-/// The start of a problem: the coarse start of a single recording, or what several say alone.
+/// The start of a problem: the coarse start of a single recording, or the separate estimates of several.
 ///
 /// # Errors
 /// [`CalibrationError`] if a recording has no start.

@@ -11,11 +11,11 @@ use crate::statistics::{FALSE_ALARM, chi_square_limit};
 pub struct Repeatability {
     /// Index.
     pub parameter: usize,
-    /// Standard deviation of the individual calibrations about the common curve …
+    /// Standard deviation of the individual calibrations about the common curve.
     pub spread: f64,
-    /// … its 1σ …
+    /// 1σ of this standard deviation.
     pub sigma: f64,
-    /// … and its expectation from their stated σ.
+    /// Standard deviation expected from the stated σ of the calibrations.
     pub claimed: f64,
     /// χ² of the deviations per degree of freedom; one if σ are correct.
     pub chi_square: f64,

@@ -1,7 +1,7 @@
 //! The noise at rest, from the dwells alone.
 //!
-//! What a part of a dwell begins with, and the constant rates and forces in it, are its own and free; the remainder
-//! shows white noise, sway and turning by hand, whatever the parameters are.
+//! Each part of a dwell has its own free initial states and constant rates and forces, so the residuals show white
+//! noise, sway and turning by hand for any parameters.
 
 use std::convert::Infallible;
 
@@ -16,9 +16,9 @@ use crate::calibration::{Model, Problem, Script};
 
 /// Step of a logarithm for differences.
 const DIFFERENCE: f64 = 1e-3;
-/// Prior 1σ of what a part begins with, rad and m/s, …
+/// Prior 1σ of the initial states of a part, rad and m/s.
 const BEGIN: f64 = 0.1;
-/// … and of the constant rates, rad/s, and specific forces, m/s², in it.
+/// Prior 1σ of the constant rates, rad/s, and specific forces, m/s², in a part.
 const RATE: f64 = 1e-3;
 const FORCE: f64 = 0.03;
 /// Degrees of freedom of the prior of a dwell's variance over that of all.
@@ -35,22 +35,22 @@ pub struct NoiseAtRest {
     pub dispersion: Dispersion,
 }
 
-/// What the parts of a dwell leave when all that they are given is free.
+/// Residuals of the parts of a dwell if all quantities given to them are free.
 #[derive(Debug, Clone, Copy, Default)]
 struct Left {
     /// Logarithm of the determinant of the covariance.
     log_determinant: f64,
-    /// Sum of squares over the variances common to all dwells …
+    /// Sum of squares over the variances common to all dwells.
     squares: f64,
-    /// … and its degrees of freedom.
+    /// Degrees of freedom of the sum of squares.
     freedom: f64,
 }
 
-/// What all dwells leave with some models.
+/// Residuals of all dwells with some models.
 struct AllLeft {
-    /// Per model and dwell.
+    /// Residuals per model and dwell.
     dwells: Vec<Vec<Left>>,
-    /// Per dwell.
+    /// Changes per dwell.
     changes: Vec<Changes>,
 }
 
@@ -58,20 +58,20 @@ struct AllLeft {
 struct Changes {
     /// Number of scalars.
     count: f64,
-    /// Sum of the changes of the logarithms of their σ, per model, …
+    /// Sum of the changes of the logarithms of σ, per model.
     logs: DVector<f64>,
-    /// … sums of products of two, …
+    /// Sums of products of two changes of the logarithms.
     of_logs: DMatrix<f64>,
-    /// … and the same of the changes of the whitened scalars.
+    /// Sums of products of two changes of the whitened scalars.
     of_scalars: DMatrix<f64>,
 }
 
 /// The scalars of a part.
 #[derive(Default, Clone)]
 struct Seen {
-    /// Each whitened, less what the part is given as all of them say; with the logarithm of its σ.
+    /// Whitened scalars minus the part explained by the given quantities, each with the logarithm of its σ.
     scalars: Vec<(f64, f64)>,
-    /// Their rows of what the part is given, one after the other.
+    /// Rows of the scalars with respect to the given quantities, one after the other.
     rows: Vec<f64>,
 }
 
@@ -80,12 +80,12 @@ struct Dwells<'a> {
     problem: &'a Problem<'a>,
     script: &'a Script,
     usual: &'a [Usual],
-    /// One pair a model.
+    /// One pair of filters per model.
     filters: Vec<[Box<dyn PartFilter>; 2]>,
 }
 
 impl Dwells<'_> {
-    /// What dwells leave with the noise at rest of these models; `None` if a covariance is not positive definite.
+    /// Residuals of the dwells with the noise at rest of these models; `None` if a covariance is not positive definite.
     fn left(&mut self, dispersion: &Dispersion, models: &[Model]) -> Option<AllLeft> {
         let mut all = AllLeft {
             dwells: vec![Vec::new(); models.len()],
@@ -252,8 +252,8 @@ impl Left {
     }
 }
 
-/// The likeliest noise at rest, each size with its prior, as seen in the middle dwell; from that at a linearisation point
-/// before, if any.
+/// The likeliest noise at rest in the median dwell, each size with its prior; starts from the noise at an earlier
+/// linearisation point, if any.
 pub fn likeliest(
     problem: &Problem,
     script: &Script,

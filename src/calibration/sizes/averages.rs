@@ -1,10 +1,10 @@
 //! Average over effects that may be absent and whose size is not known: error terms, temperature orders.
 //!
-//! A group of constants is absent with probability one half, else of its usual size, which is known to a factor three.
-//! The posterior of all constants is the average over these cases. With many groups it is found as in expectation
-//! propagation (Minka 2001, "Expectation propagation for approximate Bayesian inference", UAI 17): the prior of each
-//! group becomes the normal one about zero with which its mean is that of the average over its own cases, given the
-//! priors of all others. The covariance then is that within the cases, to which that between them is added.
+//! A group of constants is absent with probability one half; otherwise it has its usual size, known to a factor of
+//! three. The posterior of all constants is the average over these cases. With many groups the average is found as in
+//! expectation propagation (Minka 2001, "Expectation propagation for approximate Bayesian inference", UAI 17): the
+//! prior of each group becomes the normal one about zero with which its mean is that of the average over its own cases,
+//! given the priors of all others. The covariance then is that within the cases, to which that between them is added.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -66,8 +66,8 @@ impl Average {
         }
     }
 
-    /// The average given what data say of all groups, each with its places among the constants, begun at this one; `None` if
-    /// a group has a covariance that is not positive definite.
+    /// The average given the data's information on all groups, each with its places among the constants, starting from
+    /// this average; `None` if the covariance of a group is not positive definite.
     pub fn given(mut self, data: &Information, groups: &[Vec<usize>]) -> Option<Self> {
         for _ in 0..ROUNDS {
             let mut now = self.moments(data)?;
@@ -98,7 +98,7 @@ impl Average {
         })
     }
 
-    /// What all others say of a group.
+    /// Information of all other groups on a group.
     fn others(&self, places: &[usize], now: &Moments) -> Option<Information> {
         let inverse = Cholesky::new(of(&now.covariance, places))?.inverse();
         Some(Information {
@@ -121,7 +121,7 @@ fn set(matrix: &mut DMatrix<f64>, places: &[usize], block: &DMatrix<f64>) {
 }
 
 impl Moments {
-    /// With the prior of a group changed (Woodbury's identity).
+    /// Changes the prior of a group (Woodbury's identity).
     fn update(&mut self, places: &[usize], change: &DMatrix<f64>) -> Option<()> {
         let across = self.covariance.select_columns(places);
         let own = across.select_rows(places);
@@ -137,9 +137,9 @@ impl Moments {
 
 /// The cases of a group, given what all others say.
 struct Cases {
-    /// Probability that it is absent.
+    /// Probability that the group is absent.
     absent: f64,
-    /// As in [`Average`].
+    /// Inverse covariance of the normal prior, as in [`Average`].
     precision: DMatrix<f64>,
     between: DMatrix<f64>,
 }
@@ -197,7 +197,7 @@ impl Cases {
 mod tests {
     use super::*;
 
-    /// What correlated rows say of two terms of these sizes beside two other constants.
+    /// Information of correlated rows on two terms of these sizes, with two other constants.
     fn seen(terms: [f64; 2]) -> Information {
         let rows = DMatrix::from_row_slice(
             6,

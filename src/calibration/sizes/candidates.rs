@@ -1,4 +1,4 @@
-//! Constants that may be absent, averaged over that and their sizes.
+//! Constants that may be absent, averaged over absence and their sizes.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -13,13 +13,13 @@ const NEXT_TO_ABSENT: f64 = 0.01;
 #[derive(Debug, Clone)]
 pub struct Candidates {
     all: Vec<Candidate>,
-    /// Places of the constants of each among those that may be absent.
+    /// Places of the constants of each candidate among the constants that may be absent.
     places: Vec<Vec<usize>>,
     average: Average,
 }
 
 impl Candidates {
-    /// Those among constants, not yet weighed.
+    /// The candidates among constants, not yet weighed.
     pub fn new(constants: &[Constant], model: &Model) -> Self {
         let mut all = Vec::new();
         let mut places = Vec::<Vec<usize>>::new();
@@ -73,8 +73,8 @@ impl Candidates {
         self.average = begun(&self.all, &self.places);
     }
 
-    /// Averages over all cases, given what is known of the constants; returns the largest change of a probability, which is
-    /// infinite if there is no average.
+    /// Averages over all cases, given the information on the constants; returns the largest change of a probability,
+    /// which is infinite if there is no average.
     pub fn weigh(&mut self, known: &Known, prior: &Prior) -> f64 {
         if self.all.is_empty() {
             return 0.0;

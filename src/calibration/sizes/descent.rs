@@ -16,12 +16,12 @@ const STEPS: usize = 30;
 pub struct Slope {
     pub cost: f64,
     pub gradient: DVector<f64>,
-    /// About what the second derivatives are, positive definite.
+    /// Approximation of the second derivatives, positive definite.
     pub curvature: DMatrix<f64>,
 }
 
 impl Slope {
-    /// Where there is no cost.
+    /// A point where the cost is not defined.
     pub fn nowhere(size: usize) -> Self {
         Self {
             cost: f64::INFINITY,
@@ -42,7 +42,7 @@ impl Slope {
 /// The lowest point found.
 pub struct Lowest {
     pub at: DVector<f64>,
-    /// Inverse of the second derivatives there.
+    /// Inverse of the second derivatives at the lowest point.
     inverse: DMatrix<f64>,
 }
 

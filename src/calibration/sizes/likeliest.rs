@@ -1,4 +1,4 @@
-//! Sizes of the effects between dwells, by restricted likelihood with a prior each.
+//! Sizes of the effects between dwells from the restricted likelihood, each with a prior.
 
 use std::collections::BTreeMap;
 
@@ -86,10 +86,10 @@ impl<'a> Search<'a> {
 
     /// The likeliest sizes from a start, with these sites of the constants that may be absent.
     ///
-    /// One pass forward and one backward give the cost, the gradient and what each event should be (Koopman and Shephard
-    /// 1992). An event of an effect with heavy tails has a variance of its own, so that one that is larger than the others
-    /// stands out instead of widening all (Lange, Little, Taylor 1989, J. Am. Stat. Assoc. 84(408)). Each step lowers
-    /// the cost.
+    /// One forward and one backward pass give the cost, the gradient and the likeliest variance of each event (Koopman
+    /// and Shephard 1992). An event of an effect with heavy tails has a variance of its own, so that one that is larger
+    /// than the others stands out instead of widening all (Lange, Little, Taylor 1989, J. Am. Stat. Assoc. 84(408)).
+    /// Each step lowers the cost.
     ///
     /// # Errors
     /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
@@ -164,9 +164,9 @@ impl Here<'_> {
 }
 
 impl At {
-    /// The usual sizes, slips being as wide as positions: where a slip explains as much as all positions after it, it is
-    /// to be tried before them, and shrinks if it is not needed (graduated non-convexity: Blake and Zisserman, *Visual
-    /// Reconstruction*, ch. 7).
+    /// The usual sizes, with slips as wide as positions: a slip that explains as much as all later positions is tried
+    /// before them, and shrinks if not needed (graduated non-convexity: Blake and Zisserman, *Visual Reconstruction*,
+    /// ch. 7).
     pub fn usual(usual: &[Usual], chain: &Chain) -> Self {
         let drives = chain.links.iter().flat_map(|link| &link.transition.drives);
         let slips = drives.filter(|drive| matches!(drive.effect, Effect::Slip(_)));

@@ -1,4 +1,5 @@
-//! How large all effects are: noise at rest from the dwells alone, all others from the chain, and what may be absent.
+//! Sizes of all effects: noise at rest from the dwells alone, all others from the chain, and averages over effects that
+//! may be absent.
 
 mod at_rest;
 mod averages;
@@ -43,7 +44,7 @@ struct Size {
 /// How far a linearisation point is from the estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stage {
-    /// The misfit is that of the linearisation.
+    /// Errors of the linearisation dominate the residuals.
     Far,
     /// Near for the first time.
     FirstNear,
@@ -63,7 +64,7 @@ pub struct Effects {
     pub are_settled: bool,
 }
 
-/// The chain with its sizes, and what it says of the constants.
+/// The chain with its sizes, and its information on the constants.
 pub struct Weighed<'a> {
     pub filtered: Filtered<'a>,
     pub prior: Prior,
@@ -72,7 +73,7 @@ pub struct Weighed<'a> {
 }
 
 impl Effects {
-    /// As stated.
+    /// The sizes as stated.
     pub fn new(problem: &Problem) -> Self {
         let constants = Constant::all(&problem.model, problem.one_gravity());
         Self {
@@ -193,7 +194,7 @@ impl Effects {
         Chain::new(&made, script, &self.dispersion)
     }
 
-    /// What a filter with these sizes between dwells learns of the constants.
+    /// Information on the constants from a filter with these sizes between dwells.
     ///
     /// # Errors
     /// [`CalibrationError::Diverged`] if a part cannot be reduced, or a covariance is not positive definite.
@@ -207,7 +208,7 @@ impl Effects {
         Chain::information(&made, script, (&self.dispersion, sizes))
     }
 
-    /// What a chain says of the constants.
+    /// A chain with its sizes and its information on the constants.
     ///
     /// # Errors
     /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
@@ -232,7 +233,7 @@ impl Effects {
         })
     }
 
-    /// The same for some of the rows, over which candidates are averaged anew.
+    /// As [`Self::weighed`] for some of the rows; the candidates are averaged again.
     ///
     /// # Errors
     /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
@@ -284,7 +285,7 @@ impl Effects {
         model
     }
 
-    /// The noise that was used, and whether the data contradict what is stated.
+    /// The noise that was used, and whether the data contradict the stated noise.
     pub fn report(&self, problem: &Problem) -> NoiseReport {
         let policy = problem.options.noise;
         if policy == NoisePolicy::Stated {

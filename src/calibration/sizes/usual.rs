@@ -1,4 +1,4 @@
-//! Usual sizes of effects, and how well each is known beforehand.
+//! Usual sizes of effects with their priors.
 
 use crate::calibration::chain::Effect;
 use crate::calibration::model::SETTLING_TIME;
@@ -9,14 +9,14 @@ use crate::run::Aiding;
 
 /// Prior 1σ of ln σ of a stated figure: a factor of three.
 pub const LOG_SIGMA: f64 = 1.098_612_288_668_109_8;
-/// The same of a figure that is not stated, around what white noise makes: a factor of ten.
+/// Prior 1σ of ln σ of a figure that is not stated, around the effect of white noise: a factor of ten.
 const LOG_SIGMA_NOT_STATED: f64 = std::f64::consts::LN_10;
 /// Correlation time of a bias without a stated one, s.
 const CORRELATION_TIME: f64 = 100.0;
 /// Usual differences between recordings over the prior σ of an instrument.
 const DIFFERENCE: f64 = 0.1;
 
-/// What has a size.
+/// A quantity with a size.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum What {
     /// A source of noise.
@@ -27,21 +27,21 @@ pub enum What {
     Difference(Group),
 }
 
-/// A size and how well it is known beforehand.
+/// A usual size with its prior.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Usual {
     pub what: What,
-    /// In SI and radians; of a difference, over the prior σ of each parameter.
+    /// Usual size in SI and radians; for a difference, as a fraction of the prior σ of each parameter.
     pub sigma: f64,
     /// 1σ of its logarithm.
     pub spread: f64,
-    /// Whether it is stated.
+    /// Whether the size is stated.
     pub stated: bool,
 }
 
 impl Usual {
-    /// Of every source that a problem can have, and of the differences between its recordings; `moves` scale the noise
-    /// of moves.
+    /// The usual sizes of every source that a problem can have, and of the differences between its recordings; `moves`
+    /// scale the noise of moves.
     pub fn all(problem: &Problem, moves: &Moves) -> Vec<Self> {
         let sources = Source::ALL.into_iter();
         let sources = sources.filter_map(|source| Self::of(source, problem, moves));
@@ -91,7 +91,7 @@ impl Usual {
         })
     }
 
-    /// The effect of the chain that it scales; `None` if it acts within dwells alone.
+    /// The effect of the chain that this size scales; `None` if the source acts within dwells alone.
     pub fn effect(&self) -> Option<Effect> {
         match self.what {
             What::SettlingTime => None,
@@ -112,7 +112,7 @@ impl Usual {
         }
     }
 
-    /// Sets it in a model, at a logarithm over the usual size.
+    /// Sets the size in a model, as a logarithm relative to the usual size.
     pub fn set(&self, model: &mut Model, by: f64) {
         let sigma = self.sigma * by.exp();
         match self.what {

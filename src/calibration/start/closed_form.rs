@@ -65,7 +65,7 @@ pub struct ClosedForm {
 }
 
 impl ClosedForm {
-    /// Whether it may be used.
+    /// Whether the closed form may be used.
     pub fn is_usable(&self) -> bool {
         Verdict::of(&self.findings).word != Word::Failed
     }
@@ -73,10 +73,10 @@ impl ClosedForm {
 
 /// Calibrates both triads of a run without a filter.
 ///
-/// With a table log, it uses the dwells: the six positions of the paper for a triad (Earth rate or gravity along each
-/// body axis, in both directions) if present, otherwise all dwells. Without a table, it uses labelled sections or,
-/// without labels, every dwell and turn with gravity as the only reference. For exactly opposite positions, least
-/// squares equals the half sums and half differences of the paper.
+/// With a table log, the closed form uses the dwells: the six positions of the paper for a triad (Earth rate or gravity
+/// along each body axis, in both directions) if present, otherwise all dwells. Without a table, the closed form uses
+/// labelled sections or, without labels, every dwell and turn with gravity as the only reference. For exactly opposite
+/// positions, least squares equals the half sums and half differences of the paper.
 ///
 /// # Errors
 /// [`CalibrationError`] if there is no dwell. Parameters that the positions do not determine keep their prior.
@@ -92,7 +92,7 @@ pub fn six_position(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
     six_position_by(reference, problem)
 }
 
-/// The same with a given source of the reference inputs; labels need no dwells.
+/// As [`six_position`], with a given source of the reference inputs; labels need no dwells.
 pub fn six_position_by(
     reference: Reference,
     problem: &Problem,
@@ -131,7 +131,7 @@ fn share_gravity(estimate: &mut Estimate, site: &Site) {
 /// The closed form from dwells (or parts of dwells) of the first run of the problem, with table attitudes.
 ///
 /// # Errors
-/// As [`six_position`], and without a table.
+/// As [`six_position`], and if there is no table.
 pub fn six_position_of(
     problem: &Problem,
     dwells: &[Dwell],

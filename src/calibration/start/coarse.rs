@@ -21,9 +21,10 @@ const MOST_EQUATIONS: usize = 600;
 const NOISE_ROUNDS: usize = 6;
 /// A smaller step (1 ppm, 0.2″, and the same number in rad/s or m/s²) ends an iteration.
 const SMALL: f64 = 1e-6;
-/// Attitudes, heading and gyros are estimated alternately. Scale factor errors of several percent need four rounds …
+/// Attitudes, heading and gyros are estimated alternately. Scale factor errors of several percent need four rounds with
+/// the gyros alone.
 const ROUNDS_OF_GYROS: usize = 4;
-/// … before the accelerometers are also estimated.
+/// Number of rounds in all, the later ones with the accelerometers.
 const ROUNDS: usize = 8;
 
 /// Starting point of the filter.
@@ -47,7 +48,7 @@ impl CoarseStart {
 
 /// Both triads and the initial attitudes by least squares over whole dwells and moves.
 ///
-/// With a table, its attitudes are known. Without one, the accelerometers follow from `|f| = g` in the dwells, the
+/// With a table, the attitudes are known. Without a table, the accelerometers follow from `|f| = g` in the dwells, the
 /// gyros from the gravity direction before and after each move, and gyro biases and heading from the rates at rest.
 ///
 /// # Errors
@@ -118,7 +119,7 @@ pub struct Turned {
     pub at: Linearisation,
     /// 1σ of each heading, rad.
     heading_sigma: Vec<f64>,
-    /// The equations from which they are estimated, linearised at them.
+    /// The equations of the estimate, linearised at the triads and attitudes.
     pub equations: Equations,
 }
 
@@ -197,7 +198,7 @@ fn turned(
     })
 }
 
-/// The same with the noise added by hand motion, if the data show it although the residuals do not.
+/// The estimate with the noise added by hand motion, if the data show this noise although the residuals do not.
 fn calibrated_as_held(
     problem: &Problem,
     dwells: &[Vec<AtRest>],

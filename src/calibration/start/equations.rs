@@ -18,7 +18,7 @@ const STEPS: usize = 6;
 
 /// Partial derivatives of rows with respect to the unknowns of a triad.
 pub type OfTriad<const N: usize> = SMatrix<f64, N, PER_TRIAD>;
-/// The same with respect to those of both.
+/// Partial derivatives of rows with respect to the unknowns of both triads.
 pub type Partials<const N: usize> = SMatrix<f64, N, PARAMETERS>;
 
 /// A time interval with the mean noise of the triads.
@@ -37,11 +37,11 @@ pub struct Event {
 pub struct Drift {
     /// Stationary variance.
     pub variance: f64,
-    /// Mean over the event, given its value at one end, divided by this value …
+    /// Mean over the event, given the value at one end, divided by this value.
     pub mean: f64,
-    /// … its value at the other end …
+    /// Value at the other end, divided by the value at one end.
     pub decay: f64,
-    /// … and its value at the begin, given that at the end of the event before; zero without one.
+    /// Value at the begin, divided by the value at the end of the event before; zero without an event before.
     pub since: f64,
 }
 
@@ -111,7 +111,7 @@ impl<const N: usize> Rows<N> {
 pub struct Equations {
     /// The unknown parameters of both triads.
     pub unknown: Vec<usize>,
-    /// Their prior: mean divided by σ, and σ (infinite without a prior).
+    /// Prior of the unknowns: mean divided by σ, and σ (infinite without a prior).
     pub mean: DVector<f64>,
     pub sigma: DVector<f64>,
     pub rows: Vec<Rows<1>>,
@@ -121,7 +121,7 @@ pub struct Equations {
 }
 
 impl Equations {
-    /// From mean and σ of the prior of δθ; parameters with σ of zero are not estimated.
+    /// Equations with this mean and σ of the prior of δθ; parameters with σ = 0 are not estimated.
     pub fn new(mean: &ParameterVector, sigma: &ParameterVector) -> Self {
         let unknown: Vec<usize> = (0..PARAMETERS).filter(|&k| sigma[k] > 0.0).collect();
         let count = unknown.len();
@@ -135,7 +135,7 @@ impl Equations {
         }
     }
 
-    /// For the parameters of some triads, about these values.
+    /// Equations for the parameters of some triads, about these values.
     pub fn of_triads(model: &Model, at: &PerSensor<Triad>, sensors: &[Sensor]) -> Self {
         let of = |k| sensors.contains(&sensor_and_parameter(k).0);
         let sigma = |k: usize, _| if of(k) { model.prior_sigma[k] } else { 0.0 };
@@ -177,7 +177,7 @@ impl Equations {
         )
     }
 
-    /// The same with the unknowns in units of their prior σ.
+    /// As [`Self::scaled`], with the unknowns in units of their prior σ.
     pub fn in_sigmas(&self) -> (DMatrix<f64>, DVector<f64>) {
         let (design, residual) = self.scaled();
         (design * DMatrix::from_diagonal(&self.sigma), residual)

@@ -65,8 +65,8 @@ impl AtRest {
     }
 }
 
-/// Each dwell, and the move before it. The noise of a move is only that of the bias, because the random walk of each
-/// row is independent.
+/// Each dwell, with the preceding move. The noise of a move consists only of the bias variation, because the random
+/// walk of each row is independent.
 pub fn events(problem: &Problem, dwells: &[Vec<AtRest>]) -> Vec<Event> {
     let mut events = Vec::new();
     for (stretch, dwells) in problem.stretches().iter().zip(dwells) {
@@ -99,7 +99,7 @@ pub fn input_errors(triad: &Triad, correction: &Matrix3<f64>, input: &Vector3<f6
     correction * of_parameters(triad, input)
 }
 
-/// Response of rows to the mean noise of a triad over an event, equal to that to its biases.
+/// Response of rows to the mean noise of a triad over an event, which equals the response to its biases.
 pub fn of_noise<const N: usize>(
     sensor: Sensor,
     event: usize,
@@ -173,7 +173,7 @@ pub struct Heading {
     pub stretch: usize,
     /// Rotation about Up that aligns the attitudes with East-North-Up, rad.
     pub turn: Matrix3<f64>,
-    /// 1σ of its angle, rad; above one, it is unknown.
+    /// 1σ of the heading, rad; above one, the heading is unknown.
     pub sigma: f64,
 }
 
@@ -194,7 +194,7 @@ impl Heading {
     }
 }
 
-/// Attitudes of the dwells of a stretch, carried from one to the next by the gyros and levelled there.
+/// Attitudes of the dwells of a stretch: the gyros carry each attitude to the next dwell, where it is levelled.
 pub struct Chain {
     pub attitudes: Vec<Matrix3<f64>>,
     moves: Vec<Move>,
@@ -204,19 +204,19 @@ pub struct Chain {
 struct Move {
     /// s
     duration: f64,
-    /// Tilt error of the gyros after it, `C_computed = (I − [φ×]) C_true`, …
+    /// Tilt error of the gyros after the move, `C_computed = (I − [φ×]) C_true`.
     tilt: Vector3<f64>,
-    /// … per error of each gyro parameter, …
+    /// Tilt error per error of each gyro parameter.
     of_gyro: OfTriad<3>,
-    /// … and per error of each accelerometer parameter, which determine Up before …
+    /// Tilt error per error of each accelerometer parameter, due to Up before the move.
     of_before: OfTriad<3>,
-    /// … and after it.
+    /// Tilt error per error of each accelerometer parameter, due to Up after the move.
     of_after: OfTriad<3>,
-    /// Variance of each of its two components due to noise and interpolation of the gyros, …
+    /// Variance of each tilt component due to noise and interpolation of the gyros.
     walk: f64,
-    /// … due to each of [`BY_HAND`] for unit σ, …
+    /// Variance due to each of [`BY_HAND`] for unit σ.
     by_hand: [f64; BY_HAND.len()],
-    /// … and due to the first and the noise of Up.
+    /// Variance due to the gyros and the noise of Up.
     variance: f64,
 }
 
@@ -245,8 +245,7 @@ impl Chain {
         Ok(Self { attitudes, moves })
     }
 
-    /// Adds the moves between the dwells after rotation of the chain to its heading: the gyros carry Up from before the
-    /// move to after it.
+    /// Rotates the chain to its heading and adds the moves between the dwells: the gyros carry Up through each move.
     pub fn add(
         &self,
         equations: &mut Equations,

@@ -238,7 +238,7 @@ fn shortened(position: &Position, sigma: f64) -> Matrix3<f64> {
     shortened
 }
 
-/// The same, with the tilts about each axis of the position with this number.
+/// As above, with the tilts about each axis of the position with this number.
 fn by_tilts(position: &Position, sigma: f64, number: usize) -> [(Common, Matrix3<f64>); 2] {
     let tilts = skew(position.input) * sigma;
     [
@@ -253,7 +253,7 @@ struct Direction {
     /// The part common to all sections.
     number: usize,
     known: Vector3<f64>,
-    /// 1σ of the rest.
+    /// 1σ of the remainder.
     spread: Matrix3<f64>,
 }
 

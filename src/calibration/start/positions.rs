@@ -33,7 +33,7 @@ pub struct Position {
     pub output: Vector3<f64>,
     /// Variance of each output axis, (rad/s)² or (m/s²)².
     pub variance: Vector3<f64>,
-    /// Variance for its weight: the variance itself, unless that would give it too much weight.
+    /// Variance for the weight of the position: `variance`, unless this would give too much weight.
     pub weighted: Vector3<f64>,
 }
 

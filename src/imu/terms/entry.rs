@@ -31,15 +31,15 @@ pub struct TermEntry {
     pub help: &'static str,
     /// Formula of the term: its addition to specific force f or angular rate w for a parameter q.
     pub adds: &'static str,
-    /// Moves or dwells that show it, where a path does not.
+    /// Moves or dwells that show the term, where a path does not.
     pub shown_by: &'static str,
-    /// The triad whose input it changes.
+    /// The triad whose input the term changes.
     pub sensor: Sensor,
-    /// The unit of its parameters in files and reports: its symbol, and its value in SI.
+    /// Unit of the parameters in files and reports: symbol, and value in SI.
     pub unit: (&'static str, f64),
-    /// Their SI unit.
+    /// SI unit of the parameters.
     pub si_unit: &'static str,
-    /// The same as D-SI spells it.
+    /// SI unit in D-SI spelling.
     pub d_si_unit: &'static str,
     /// Default 1σ of each parameter, in `unit`: ten
     /// times the value of precise instruments.

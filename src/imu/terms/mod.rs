@@ -117,15 +117,14 @@ impl Term {
         all.filter(move |term| term.entry().sensor == sensor)
     }
 
-    /// Default 1σ of each of its parameters, in SI: ten times the value of precise
-    /// instruments.
+    /// Default 1σ of each parameter of the term, in SI: ten times the value of precise instruments.
     pub fn usual_sigma(self) -> f64 {
         let entry = self.entry();
         entry.usual_sigma * entry.unit.1
     }
 
-    /// Usual size of each of its parameters in an instrument with this noise, in SI: that of precise instruments, and as
-    /// much more as the white noise of its triad is; lever arms and delays do not depend on the class.
+    /// Usual size of each parameter in an instrument with this noise, in SI: the size in precise instruments times the
+    /// ratio of the white noise of the triad to theirs; lever arms and delays do not depend on the class.
     pub fn usual_size(self, noise: &PerSensor<Noise>) -> f64 {
         let precise = 0.1 * self.usual_sigma();
         if matches!(self, Self::SizeEffect | Self::TimeOffset) {

@@ -16,7 +16,7 @@ const HEIGHT: usize = 2;
 pub struct Leg {
     start: f64,
     pub duration: f64,
-    /// At its start.
+    /// Speed, heading and height at the start of the segment.
     from: [f64; 3],
     changes: [Profile; 3],
 }
@@ -114,7 +114,7 @@ impl Kinematics {
         [pitch, roll]
     }
 
-    /// Whether nothing but position changes.
+    /// Whether only position changes.
     pub fn is_steady(&self) -> bool {
         let Self([speed, heading, height]) = self;
         let changes = [

@@ -22,9 +22,9 @@ const LEAST: u32 = 8;
 pub struct Stride {
     /// Length, s.
     pub duration: f64,
-    /// In its middle.
+    /// Instant in the middle of the step.
     pub middle: Instant,
-    /// At its end.
+    /// Instant at the end of the step.
     pub end: Instant,
 }
 
@@ -86,7 +86,7 @@ impl Strides<'_> {
     /// `beside` rad/s relative to the body.
     ///
     /// # Errors
-    /// The first that is returned for a stride.
+    /// The first error returned for a stride.
     pub fn go<E>(
         &mut self,
         until: f64,

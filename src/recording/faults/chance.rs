@@ -10,7 +10,7 @@ const RECORDS: f64 = 1e4;
 pub struct Limit {
     /// −ln of the probability that a faultless sample exceeds the limit.
     pub nats: f64,
-    /// The same in σ of a normal distribution, two-sided.
+    /// The equivalent two-sided limit in σ of a normal distribution.
     pub sigmas: f64,
 }
 

@@ -21,7 +21,7 @@ const WORST_ANGLE: f64 = 0.2 * DEGREE;
 
 /// The complete samples, with faults and bridges.
 pub struct Repaired {
-    /// As in [`Rows`], a value for each sample.
+    /// Columns as in [`Rows`], with a value for each sample.
     pub columns: [Vec<f64>; 6],
     /// Faults found.
     pub faults: Vec<Fault>,

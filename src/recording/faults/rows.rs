@@ -11,7 +11,7 @@ use crate::recording::ColumnFacts;
 pub struct Rows<'a> {
     /// Gyro x, y, z and accelerometer x, y, z.
     pub columns: [Vec<f64>; 6],
-    /// What the reader found of each.
+    /// Facts that the reader found about each column.
     pub facts: &'a [ColumnFacts; 6],
     /// Full scale of each column, in the file's quantity.
     pub full_scale: [Option<f64>; 6],
@@ -27,7 +27,7 @@ pub struct Rows<'a> {
     pub numbers: Vec<usize>,
     /// Sample period, s.
     pub period: f64,
-    /// Rows before each duplicate, and its line.
+    /// Number of rows before each duplicate, and the line of the duplicate.
     pub duplicates: Vec<(usize, u64)>,
 }
 
@@ -44,7 +44,7 @@ pub struct FaultyRows {
 }
 
 impl FaultyRows {
-    /// The columns that it concerns.
+    /// The columns that the fault concerns.
     pub fn columns(&self) -> Range<usize> {
         self.column.map_or(0..6, |column| column..column + 1)
     }

@@ -12,13 +12,13 @@ use crate::recording::ImuSamples;
 pub struct Slower {
     /// From the first sample without a row to the last.
     pub samples: Range<usize>,
-    /// Line of the row before them.
+    /// Line of the row before these samples.
     pub line: u64,
     /// Number of samples from one row to the next.
     pub step: usize,
-    /// Number of places between rows …
+    /// Number of places between rows.
     pub places: usize,
-    /// … and of those that are bridged.
+    /// Number of these places that are bridged.
     pub bridged: usize,
 }
 

@@ -64,7 +64,7 @@ fn grid(step: f64) -> f64 {
 struct Bends {
     /// Magnitude at each row relative to the σ of its surroundings, assuming white noise.
     relative: Vec<f64>,
-    /// The quantile that few of them exceed.
+    /// The quantile that few rows exceed.
     outer: f64,
     /// The limit that no faultless value exceeds.
     limit: f64,

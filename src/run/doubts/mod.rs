@@ -1,4 +1,4 @@
-//! Checks of a run on input: unusual but possible facts that are reported.
+//! Checks of a run on input, which report unusual but possible facts.
 
 mod clock;
 mod columns;
@@ -24,7 +24,7 @@ impl Run {
     }
 
     /// A sentence on the true order of the table's quaternions, or on their inverse, if gravity contradicts the stated
-    /// one.
+    /// order.
     pub fn table_quaternions(&self) -> Option<String> {
         quaternions::order(self)
     }

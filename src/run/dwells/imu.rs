@@ -22,11 +22,11 @@ const FEWEST: usize = 4;
 /// A standstill of this many seconds between two moves is always found. Its ends cut up to one window in all; at each
 /// end, the next window differs from its neighbour, and the one after is dropped because it may be a gentle move.
 pub const LONG_ENOUGH: f64 = (1 + 2 * 2 + FEWEST) as f64 * WINDOW;
-/// Output at rest is within this many σ of its noise …
+/// Output at rest varies by less than this many σ of its noise, plus a rate and a force.
 pub const STILL_SIGMAS: f64 = 6.0;
-/// … and angular rate within the drift of the worst bias in seconds, rad/s …
+/// The rate: drift of the worst bias within seconds, rad/s.
 pub const STILL_RATE: f64 = 100.0 * DEG_PER_H;
-/// … and specific force within this, m/s²: a turn of 0.02°.
+/// The force, m/s²: a turn of 0.02°.
 const STILL_FORCE: f64 = 3e-3;
 /// False-alarm rate of the test that ends a standstill at a window that differs from its neighbours: an axis
 /// has started to turn, or still settles. A false alarm costs a window.
@@ -43,7 +43,7 @@ const BIAS_SIGMAS: f64 = 6.0;
 struct Slide {
     /// Samples per window.
     length: usize,
-    /// Samples from one to the next.
+    /// Samples from one window to the next.
     step: usize,
 }
 
@@ -52,7 +52,7 @@ struct Windows {
     slide: Slide,
     /// NaN if samples are missing, so that the window does not count as at rest or steady.
     means: Vec<Vector3<f64>>,
-    /// 1σ per axis of their noise.
+    /// 1σ per axis of the noise of the means.
     sigma: f64,
 }
 

@@ -8,17 +8,16 @@ use crate::run::Run;
 use crate::run::dwell::{Dwell, Position, SHORTEST};
 use crate::units::ARCSEC;
 
-/// Readings of a table at rest differ by less than this many σ of their noise …
+/// Readings of a table at rest differ by less than this many σ of their noise.
 const STANDING_SIGMAS: f64 = 6.0;
-/// … or this much, regardless of noise.
+/// Readings of a table at rest may differ by this much, regardless of noise.
 const STANDING_ANGLE: f64 = 2.0 * ARCSEC;
 /// Time cut off at both ends, s: a table that starts smoothly has moved before two readings show
 /// it, and a table that has stopped still rings.
 const MARGIN: f64 = 0.2;
-/// Length of the stretch at an end of a dwell whose mean reveals creep, or an early start of the next
-/// move, s …
+/// Length of the stretch at an end of a dwell whose mean reveals creep, or an early start of the next move, s.
 const CREEP_STRETCH: f64 = 1.0;
-/// … by this many σ.
+/// Number of σ by which this mean reveals creep.
 const CREEP_SIGMAS: f64 = 5.0;
 /// Least time between readings that are compared to distinguish a slow turn from a standstill in a dense log, s.
 const APART: f64 = 0.05;

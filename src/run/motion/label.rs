@@ -19,11 +19,11 @@ use crate::units::DEGREE;
 const OTHER_AXIS: f64 = 30.0 * DEGREE;
 /// Maximum fraction of time for which a section labelled as a position may move.
 const MOVING: f64 = 0.05;
-/// A section with a faster rate at its start or end starts or ends within a turn, rad/s …
+/// A section with a faster rate at its start or end starts or ends within a turn, rad/s.
 const TURNING: f64 = 15.0 * DEGREE;
-/// … unless less than this of the turn lies outside, up to the dwells around it, rad.
+/// Angle of the turn that may lie outside the section, up to the neighbouring dwells, rad.
 const LOST: f64 = 3.0 * DEGREE;
-/// Length of its ends, s.
+/// Length of the ends of a section, s.
 const END: f64 = 0.1;
 
 /// A section with the result of its check.
@@ -44,14 +44,14 @@ pub struct LabelCheck {
 pub enum Verdict {
     /// The label is neither a position nor a turn.
     Unknown,
-    /// It is a position.
+    /// The label is a position.
     Position {
         /// Angle between the measured and the labelled up direction, rad.
         off: f64,
         /// Time for which the section moves, s.
         moving: f64,
     },
-    /// It is a turn.
+    /// The label is a turn.
     Turn {
         /// Measured angle about the labelled axis, rad.
         angle: f64,

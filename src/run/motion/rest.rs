@@ -24,7 +24,7 @@ pub struct Rest {
 pub struct Up {
     /// Index of the body axis: right, front or up.
     pub axis: usize,
-    /// Whether it points down.
+    /// Whether the axis points down.
     pub down: bool,
     /// Angle from the vertical, rad.
     pub tilt: f64,
@@ -41,7 +41,7 @@ impl Up {
         }
     }
 
-    /// Whether it is nearly vertical.
+    /// Whether the axis is nearly vertical.
     pub fn is_upright(&self) -> bool {
         self.tilt < UPRIGHT
     }

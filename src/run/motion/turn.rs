@@ -12,11 +12,11 @@ use crate::run::Run;
 use crate::run::turning::{SMALLEST, steps};
 use crate::units::DEGREE;
 
-/// A turn counts as single-axis if the integrals of the rates reach this part of the total angle …
+/// A turn counts as single-axis if the integrals of the rates reach this part of the total angle.
 const ALONG: f64 = 0.95;
-/// … and the rotation agrees with the single rotation by these integrals within this, rad …
+/// The rotation must also agree with the single rotation by these integrals within this angle, rad.
 const ONE_AXIS: f64 = 1.0 * DEGREE;
-/// … plus this part of the total angle.
+/// Part of the total angle that is added to this tolerance.
 const APART: f64 = 0.02;
 /// A turn about an axis within this angle of a body axis is assigned to that body axis.
 const NEAR_AXIS: f64 = 15.0 * DEGREE;
@@ -28,17 +28,18 @@ pub struct Turn {
     pub samples: Range<usize>,
     /// Unit vector along body axes, in their positive half.
     pub axis: Vector3<f64>,
-    /// Angle, right-handed about the axis, rad; of a turn about several axes, that of the equivalent single rotation.
+    /// Angle about the axis, right-handed, rad; for a turn about several axes, the angle of the equivalent single
+    /// rotation.
     pub angle: f64,
     /// Integrals of the rates about each body axis, rad.
     pub sum: Vector3<f64>,
-    /// Whether it is about one axis throughout.
+    /// Whether the turn is about one axis throughout.
     pub single: bool,
     /// Maximum rate about any body axis, rad/s.
     pub fastest: f64,
-    /// `C` from the body axes after the turn to those before.
+    /// `C` from the body axes after the turn to the body axes before it.
     pub rotation: Matrix3<f64>,
-    /// Index of the dwell before it; the next dwell follows it.
+    /// Index of the dwell before the turn; the next dwell follows the turn.
     pub from: Option<usize>,
     /// Angle between the up direction propagated by the gyros and that of the accelerometers after the turn, rad.
     pub off_gravity: Option<f64>,
@@ -79,7 +80,7 @@ impl Turn {
         }
     }
 
-    /// The body axis of the turn, if it is about one.
+    /// The body axis of the turn, if the turn is about a body axis.
     pub fn body_axis(&self) -> Option<usize> {
         let axis = self.axis.iamax();
         (self.single && self.axis[axis] > NEAR_AXIS.cos()).then_some(axis)

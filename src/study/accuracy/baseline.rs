@@ -12,7 +12,7 @@ use crate::simulation::{Scenario, Simulated};
 use crate::study::StudyError;
 use crate::turntable::Table;
 
-/// The runs of the closed form. It is also evaluated on the first part of every dwell, as if the dwells
+/// The runs of the closed form. The closed form is also evaluated on the first part of every dwell, as if the dwells
 /// were short enough for the filter's table time.
 #[derive(Debug, Clone)]
 pub struct Baseline {
@@ -20,7 +20,7 @@ pub struct Baseline {
     pub scenario: Scenario,
     /// Length of the run, s.
     pub table_time: f64,
-    /// Total time of the dwells in it, s.
+    /// Total time of the dwells in the run, s.
     standing: f64,
     /// Part of each dwell for which the table time equals that of the filter; one if the filter takes more
     /// than the whole run, `None` if it takes less than the moves between the positions.

@@ -1,4 +1,4 @@
-//! What the study simulates, and how the filter is set.
+//! The simulated scenario of the study, and the settings of the filter.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,11 +11,11 @@ use crate::simulation::Scenario;
 pub struct AccuracyStudy {
     /// The simulated scenario.
     pub scenario: Scenario,
-    /// The filter's misalignment form; the truth has that of the scenario.
+    /// The filter's misalignment form; the truth has the form of the scenario.
     pub form: InstallationForm,
     /// Error terms of the truth that the filter does not model.
     pub unmodelled: Vec<ErrorTerm>,
-    /// Whether the filter averages over error terms that may be there.
+    /// Whether the filter averages over error terms that may be present.
     pub auto_terms: bool,
     /// Noise policy of the filter.
     pub noise: NoisePolicy,

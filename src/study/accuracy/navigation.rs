@@ -71,7 +71,7 @@ pub enum Region {
 pub struct Containment {
     /// The region.
     pub region: Region,
-    /// Number of runs with errors within it.
+    /// Number of runs with errors within the region.
     pub within: usize,
     /// Number of runs.
     pub runs: usize,
@@ -181,7 +181,7 @@ impl Region {
         Self::Ellipse(2.45),
     ];
 
-    /// Probability of an error within it, if the covariance is correct.
+    /// Probability of an error within the region, if the covariance is correct.
     pub fn probability(self) -> f64 {
         match self {
             Self::East | Self::North => erf(0.5f64.sqrt()),

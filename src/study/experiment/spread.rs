@@ -7,7 +7,7 @@ use crate::study::ratio::quantile;
 /// Distribution of a length.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Spread {
-    /// Half of all values are below it.
+    /// The median: half of all values are smaller.
     pub median: f64,
     /// The mean.
     pub mean: f64,
@@ -16,10 +16,10 @@ pub struct Spread {
     /// First and third quartile.
     #[serde(skip)]
     pub quartiles: (f64, f64),
-    /// 68 % of all values are below it.
+    /// The limit below which 68 % of all values lie.
     #[serde(rename = "below_68_percent")]
     pub below_68: f64,
-    /// 95 % of all values are below it.
+    /// The limit below which 95 % of all values lie.
     #[serde(rename = "below_95_percent")]
     pub below_95: f64,
 }

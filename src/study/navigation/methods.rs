@@ -10,7 +10,7 @@ use crate::imu::{PerSensor, Triad};
 /// The navigation errors of one calibration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MethodOutlook {
-    /// Name that distinguishes it from others, such as `EKF` or `closed form`.
+    /// Name that distinguishes the calibration from others, such as `EKF` or `closed form`.
     pub method: &'static str,
     /// The errors at the start and after each interval.
     pub outlook: Vec<Outlook>,

@@ -14,13 +14,13 @@ const LENGTHS: Units = &[("nmile", NAUTICAL_MILE), ("m", 1.0)];
 /// A component of the error, or the horizontal length of two.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Quantity {
-    /// Such as `pitch`.
+    /// Name, such as `pitch`.
     pub name: &'static str,
     /// Name in documents, with its unit.
     pub key: &'static str,
     /// Index in [`Outlook::sigma`]; for a horizontal length, that of its first component.
     place: usize,
-    /// Whether it has a sign, and a normal distribution where parameters have one.
+    /// Whether the quantity has a sign, and a normal distribution where parameters have one.
     pub is_component: bool,
     units: Units,
 }
@@ -70,8 +70,8 @@ impl Quantity {
         self.units[0].1
     }
 
-    /// A unit in which values up to this one, given in the usual unit, have few zeros; and its number in the usual
-    /// unit.
+    /// A unit in which values up to this one have few zeros, and its size in the usual unit, in which `largest` is
+    /// given.
     pub fn readable_unit(self, largest: f64) -> (&'static str, f64) {
         let (unit, value) = readable(self.units, largest * self.unit_value());
         (unit, self.unit_value() / value)
@@ -87,7 +87,7 @@ impl Quantity {
         Some(self.of(moment.sigma.as_ref()?))
     }
 
-    /// The same for all errors or their σ, in the order of [`Outlook::sigma`].
+    /// The quantity from all errors or their σ, in the order of [`Outlook::sigma`].
     pub fn of(self, all: &ErrorVector) -> f64 {
         let si = if self.is_component {
             all[self.place]

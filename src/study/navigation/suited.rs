@@ -1,4 +1,4 @@
-//! Missions of a duration suited to the grade, and what a calibration makes of them.
+//! Missions of a duration suited to the grade, and their navigation errors with a calibration.
 
 use super::outlook::{Outlook, sigma};
 use super::{INTERVAL, Mission, NavigationStudyError, Pair};

@@ -161,7 +161,7 @@ pub enum Installation {
     OfForm,
     /// Three angles from the entries above the diagonal.
     Upper,
-    /// Three angles from the entries below it.
+    /// Three angles from the entries below the diagonal.
     Lower,
     /// Six angles, `E_zy` with the wrong sign.
     ZyNegated,

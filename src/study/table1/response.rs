@@ -22,7 +22,7 @@ pub fn standing(latitude: f64, duration: f64) -> Mission {
     }
 }
 
-/// Navigation errors by constant errors of the sensed rate and specific force, at evenly spaced times.
+/// Navigation errors due to constant errors of the sensed rate and specific force, at evenly spaced times.
 ///
 /// At rest under constant sensor errors, the linear error model has constant coefficients: its response to each
 /// unit error (a unit bias of an otherwise ideal instrument) is computed once, and every sample is a linear combination

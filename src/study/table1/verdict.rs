@@ -15,11 +15,11 @@ const ROUNDING: f64 = 1e-6;
 pub enum Verdict {
     /// All five means agree as stated.
     Reproduced,
-    /// Both are zero except for rounding.
+    /// The computed and the published errors are zero except for rounding.
     Zero,
     /// All five means agree under another reading that a correct program may implement.
     UnderAnotherReading(&'static Reading),
-    /// They agree under no reading of a correct program; contains the mistake under which they agree, if one is
+    /// The figures agree under no reading of a correct program; contains the mistake under which they agree, if one is
     /// known.
     NotReproducible(Option<&'static Reading>),
 }

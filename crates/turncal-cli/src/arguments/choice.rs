@@ -24,7 +24,7 @@ pub const METHODS: [Choice<Method>; 2] = [
     ),
 ];
 
-/// What may be required of a calibration: all parameters, or those whose names begin so.
+/// Parameters that --require may name: all, or those whose names begin in this way.
 pub const REQUIRED: [Choice<&str>; 9] = [
     ("all", "Every parameter that is estimated", ""),
     ("gyro", "All of the gyros", "gyro."),

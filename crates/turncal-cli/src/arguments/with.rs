@@ -10,11 +10,11 @@ use turncal::calibration::ErrorTerm;
 /// A value of `--with`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum With {
-    /// Every error term, averaged over being absent and its usual sizes.
+    /// Every error term, averaged over its absence and its usual sizes.
     Auto,
     /// K, E and D alone.
     None,
-    /// This term, whatever the data say.
+    /// This term, in any case.
     Term(ErrorTerm),
 }
 
@@ -44,7 +44,7 @@ impl With {
         all.iter().all(|of| *of == Self::Auto)
     }
 
-    /// Exits with the status for wrong usage if auto or none has another value beside it.
+    /// Exits with the status for wrong usage if auto or none is combined with another value.
     pub fn check(all: &[Self]) {
         let Some(&alone) = all.iter().find(|of| of.term().is_none()) else {
             return;

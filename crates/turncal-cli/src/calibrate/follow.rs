@@ -131,7 +131,7 @@ struct Followed<'a> {
     of_log: &'a OfLog,
     /// The run.toml or log to read.
     read: PathBuf,
-    /// What was read, and the size of the log when its fields were found.
+    /// The run read last, and the size of the log when its fields were found.
     opened: Option<(Opened, u64)>,
     evaluator: Evaluator,
     /// The calibration of earlier rows, which would delay the status.

@@ -143,7 +143,7 @@ impl Incoming {
     }
 }
 
-/// What has been received.
+/// Rows received so far.
 #[derive(Default)]
 pub struct Received {
     pub bytes: u64,

@@ -58,7 +58,7 @@ const FOLLOWING: &str = "Following a log";
 ///
 /// Several runs are the units of a lot: each is calibrated into DIR/units/NAME/, and DIR/lot.json, lot.csv and
 /// index.html summarise the lot. Units that fail are listed with the reason; the command then fails after writing
-/// everything. Rerun it to process only missing or changed units.
+/// everything. The same command, run again, processes only missing or changed units.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal calibrate imu.csv --latitude 48.1 --sensor bmi088
@@ -106,11 +106,11 @@ pub struct Calibrate {
     /// specification can be decided, no more rows arrive, or Ctrl-C is pressed
     #[arg(long, conflicts_with_all = ["shard", "temperature", "truth"], help_heading = FOLLOWING)]
     follow: bool,
-    /// File to keep the rows of - or a device in; an existing file must contain such rows, and is continued [default:
-    /// follow-TIME.csv]
+    /// File for the rows of - or a device; an existing file must contain rows of the same kind, and is continued
+    /// [default: follow-TIME.csv]
     #[arg(long, value_name = "FILE", requires = "follow", help_heading = FOLLOWING)]
     keep: Option<PathBuf>,
-    /// The run.toml that describes the rows; those of - or a device are kept in the file named there, which must be new
+    /// The run.toml that describes the rows; the file that it names keeps the rows of - or a device, and must be new
     #[arg(long, value_name = "RUN.toml", requires = "follow", conflicts_with = "keep", value_parser = run_file, help_heading = FOLLOWING)]
     run: Option<PathBuf>,
     /// Time without growth after which a followed file is complete, s

@@ -1,4 +1,4 @@
-//! What is shown while a log is followed.
+//! The display while a log is followed.
 
 use std::collections::BTreeSet;
 use std::io::{self, IsTerminal};

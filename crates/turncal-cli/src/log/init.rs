@@ -10,8 +10,8 @@ use turncal_logs::DataFile;
 
 /// Writes a draft of run.toml for a log without one
 ///
-/// Identifies the columns by name or value, the time unit, the sensor units (from gravity at rest and its rotation with
-/// the gyros), and the white noise at rest, and gives a reason for each guess. Fields that the log cannot show are
+/// Identifies the columns by name or value, the time unit, the sensor units (from gravity at rest and its change when
+/// the gyros turn), and the white noise at rest, and gives a reason for each guess. Fields that the log cannot show are
 /// marked TODO.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
@@ -24,7 +24,7 @@ pub struct Init {
     /// a ROS bag, PX4 ULog, ArduPilot DataFlash, MAT, NPY or NPZ, whose streams are listed
     #[arg(value_name = "IMU.csv")]
     log: PathBuf,
-    /// The same as --accel-file
+    /// Log of the accelerometers, as with --accel-file
     #[arg(value_name = "ACCEL.csv", conflicts_with_all = ["stream", "accel_file"])]
     accel: Option<PathBuf>,
     #[command(flatten)]

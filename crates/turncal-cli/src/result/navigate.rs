@@ -48,7 +48,8 @@ pub struct Navigate {
         value_parser = latitude
     )]
     latitude_deg: Option<f64>,
-    /// Height above the ellipsoid in metres [default: 0, or that of the trajectory, which shifts with it]
+    /// Height above the ellipsoid in metres [default: 0, or the height of the trajectory; the whole trajectory shifts
+    /// to it]
     #[arg(long, value_name = "H", allow_negative_numbers = true, value_parser = height)]
     height_m: Option<f64>,
     /// Attitude at rest, in degrees

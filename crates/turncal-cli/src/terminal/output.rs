@@ -49,7 +49,7 @@ pub fn print(bytes: &[u8]) -> anyhow::Result<()> {
     stream(|stdout| stdout.write_all(bytes))
 }
 
-/// The same for output too large for memory.
+/// Writes output that is too large for memory to standard output.
 pub fn stream(write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> anyhow::Result<()> {
     let mut stdout = BufWriter::new(io::stdout().lock());
     match write(&mut stdout).and_then(|()| stdout.flush()) {

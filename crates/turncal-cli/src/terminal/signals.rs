@@ -2,9 +2,9 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Whether Ctrl-C ends what is going on instead of the command …
+/// Whether Ctrl-C ends the current activity instead of the command.
 static ENDS_GENTLY: AtomicBool = AtomicBool::new(false);
-/// … and whether it was pressed.
+/// Whether Ctrl-C was pressed.
 static ENDED: AtomicBool = AtomicBool::new(false);
 
 /// From here on, the first Ctrl-C or request to end makes [`is_ended`] true; the next one ends the command.

@@ -172,7 +172,7 @@ impl Part {
         Ok(part)
     }
 
-    /// The bytes of its file.
+    /// The bytes of `job.json`.
     pub fn to_json(&self) -> Vec<u8> {
         // Names, numbers and texts are all there is: these can always be written.
         small_file::pretty(self).unwrap_or_default()

@@ -63,8 +63,8 @@ impl LotDirectory {
     /// finish first. With `force` the lot restarts from the beginning.
     ///
     /// # Errors
-    /// [`FileError`] if it holds another job, another part of this one, units that do not belong to this lot, or files
-    /// not written by turncal in places that would be overwritten.
+    /// [`FileError`] if the directory contains another job, another part of this one, units that do not belong to this
+    /// lot, or files not written by turncal in places that would be overwritten.
     pub fn open(
         target: &Path,
         part: &Part,

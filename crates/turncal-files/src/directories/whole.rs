@@ -55,7 +55,8 @@ impl WholeDirectory {
                     format!("{} in it", held.display())
                 };
                 let expected = "a directory that can be replaced";
-                let advice = "Choose another name; replacing this one would delete files that are still needed.";
+                let advice = "Choose another name, because replacing this directory would delete files that are still \
+                    needed.";
                 return Err(FileError::of(target, found, expected, advice));
             }
             only_output(target)?;
@@ -78,7 +79,7 @@ impl WholeDirectory {
         self.commit_with(&list)
     }
 
-    /// The same for a directory that grows: see `list_anew`.
+    /// Moves a growing directory into place: see `list_anew`.
     pub fn commit_growing(self, names: &[&str]) -> Result<(), FileError> {
         let list = manifest::of_names(names.iter().copied());
         self.commit_with(&list)
@@ -123,7 +124,8 @@ fn only_output(directory: &Path) -> Result<(), FileError> {
         let (name, list) = (foreign.display(), manifest::FILE);
         let found = format!("`{name}` in it, which turncal's list of its own files (`{list}`) does not name");
         let expected = "a directory with only files that turncal wrote";
-        let advice = "Move it elsewhere or choose another name, because replacing the directory would delete it.";
+        let advice = "Move this file elsewhere or choose another name, because replacing the directory would delete \
+            the file.";
         Err(FileError::of(directory, found, expected, advice))
     })
 }
@@ -133,7 +135,7 @@ pub fn write_whole(path: &Path, bytes: &[u8], force: bool) -> Result<(), FileErr
     write_whole_with(path, force, |mut file| file.write_all(bytes))
 }
 
-/// The same for output too large for memory: `write` receives the temporary file.
+/// As [`write_whole`] for output too large for memory: `write` receives the temporary file.
 pub fn write_whole_with(
     path: &Path,
     force: bool,

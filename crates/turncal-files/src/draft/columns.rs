@@ -94,7 +94,7 @@ impl Columns {
         }
     }
 
-    /// Replaces columns by those that the user states.
+    /// Replaces columns by the columns that the user states.
     pub fn state(&mut self, stated: &StatedColumns) {
         let place = |name: &String| self.names.iter().position(|of| of == name);
         let of_triads = PerSensor::from_fn(|sensor| {

@@ -62,9 +62,9 @@ pub struct Draft {
     down: Option<usize>,
     /// Number of rows examined, if the log has more.
     only: Option<usize>,
-    /// Statements of the user …
+    /// Statements of the user.
     stated: Stated,
-    /// … and the first that the rows contradict: evidence, statement, remedy.
+    /// The first statement that the rows contradict: evidence, statement, remedy.
     contradiction: Option<[String; 3]>,
 }
 
@@ -77,7 +77,7 @@ impl Draft {
         Self::of_stream(&path.into(), None, &Stated::default())
     }
 
-    /// The same for one stream of a log, with statements about it.
+    /// Examines one stream of a log, with statements about it.
     ///
     /// # Errors
     /// [`FileError`] if it cannot be read or has too few rows.

@@ -12,15 +12,15 @@ use turncal::units::DEGREE;
 
 /// Length of the compared windows, s.
 pub const WINDOW: f64 = 0.25;
-/// Windows at rest differ by less than this many σ of their noise …
+/// Windows at rest differ by less than this many σ of their noise, plus a fraction.
 const SIGMAS: f64 = 6.0;
-/// … and this fraction of gravity or of the fastest turn.
+/// This fraction of gravity or of the fastest turn.
 const PART: f64 = 1e-3;
-/// Samples on either side of a cut …
+/// Samples on either side of a cut.
 const BESIDE: usize = 8;
-/// … between which the gravity direction jumps by this much, rad …
+/// The gravity direction jumps by this much at a cut, rad.
 const CUT: f64 = 30.0 * DEGREE;
-/// … but varies by less on each side.
+/// The gravity direction varies by less than this on each side of a cut, rad.
 const STEADY: f64 = 5.0 * DEGREE;
 /// Step of the integration of the gravity direction, s.
 pub const FOLLOWED: f64 = 0.08;
@@ -67,7 +67,7 @@ fn noise(means: &[Vector3<f64>]) -> f64 {
 }
 
 impl Motion {
-    /// From samples; others are missing before those in `breaks`.
+    /// Motion from samples; rows are missing before the samples in `breaks`.
     pub fn find(samples: &PerSensor<Vec<Vector3<f64>>>, breaks: &[usize], period: f64) -> Self {
         let length = ((WINDOW / period).round() as usize).clamp(1, samples.gyro.len().div_ceil(8));
         let gyro = means(&samples.gyro, length);

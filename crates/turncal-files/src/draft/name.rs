@@ -195,7 +195,7 @@ impl Name {
         unit.is_some_and(|unit| unit.word == word)
     }
 
-    /// Whether it distinguishes several instruments.
+    /// Whether the column distinguishes several instruments.
     pub fn is_instance(&self) -> bool {
         let names = [
             "i", "id", "instance", "imu", "imuid", "device", "deviceid", "sensorid",

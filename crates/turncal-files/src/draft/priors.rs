@@ -16,7 +16,7 @@ struct Class {
     name: &'static str,
     /// Gyro white noise below which an instrument belongs to this class, rad/√s.
     angle_random_walk: f64,
-    /// The same of the accelerometers, (m/s)/√s.
+    /// Accelerometer white noise below which an instrument belongs to this class, (m/s)/√s.
     velocity_random_walk: f64,
     scale_ppm: f64,
     installation: f64,

@@ -15,7 +15,7 @@ pub struct RawSamples {
     pub breaks: Vec<usize>,
     /// s
     pub period: f64,
-    /// Whether they are whole numbers.
+    /// Whether the rows are whole numbers.
     pub whole: PerSensor<bool>,
     /// Whether signed numbers of 16 bits were written as unsigned ones.
     wrapped: PerSensor<bool>,

@@ -158,9 +158,9 @@ pub struct Gap {
 struct Steps {
     /// Mean step per sample, with missing rows counted.
     mean: f64,
-    /// Whether steps are whole numbers …
+    /// Whether steps are whole numbers.
     is_whole: bool,
-    /// … mostly one.
+    /// Whether steps are whole numbers, mostly one.
     is_count: bool,
     gaps: Vec<Gap>,
     repeated: usize,

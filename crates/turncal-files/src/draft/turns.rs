@@ -12,15 +12,15 @@ pub const ENOUGH: f64 = 20.0 * DEGREE;
 const MOST: f64 = 2.0 * TAU;
 /// Moves this many times as long are not used, because a small error of the unit is a large error of their angle.
 const LONG: f64 = 4.0;
-/// Successive trials differ by this factor …
+/// Successive trials differ by this factor.
 const STEP: f64 = 1.03;
-/// … of which this many parts are tried about the best.
+/// Parts of this factor that are tried about the best.
 const FINER: i32 = 20;
 /// Trials within this factor of the best are no other.
 const SAME: f64 = 1.25;
-/// Square error relative to that without rotation …
+/// Largest square error of a fitting unit, relative to the error without rotation.
 const GOOD: f64 = 0.1;
-/// … and the factor by which other units fit worse.
+/// Factor by which other units fit worse.
 const TOLD_APART: f64 = 3.0;
 
 /// A short interval of a log.
@@ -30,13 +30,13 @@ pub struct Interval {
     /// Direction of gravity, if the specific force has its magnitude.
     pub up: Option<Vector3<f64>>,
     pub is_at_rest: bool,
-    /// Whether rows are missing before its end.
+    /// Whether rows are missing before the end of the interval.
     pub is_broken: bool,
 }
 
 /// A move from a dwell to the next.
 struct Move<'a> {
-    /// Gravity direction before it.
+    /// Gravity direction before the move.
     up: Vector3<f64>,
     /// Up to the first interval of the next dwell.
     intervals: &'a [Interval],

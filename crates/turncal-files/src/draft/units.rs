@@ -25,7 +25,7 @@ pub struct Unit {
     /// Name in `run.toml`, if known.
     pub word: Option<&'static str>,
     pub why: String,
-    /// Whether it is confirmed by motion or stated by the user.
+    /// Whether the unit is confirmed by motion or stated by the user.
     pub is_shown: bool,
     /// Whether rows that are not whole numbers fit no known unit.
     pub is_unfit: bool,
@@ -290,7 +290,7 @@ impl Quantities {
         }
     }
 
-    /// Whether a triad holds counts of no known size.
+    /// Whether a triad contains counts of unknown size.
     pub fn has_counts(&self) -> bool {
         Sensor::ALL.into_iter().any(|sensor| self.is_count(sensor))
     }

@@ -47,7 +47,7 @@ pub struct Residual {
 }
 
 impl Residual {
-    /// Those of both triads that exceed rounding.
+    /// Residual errors of both triads that exceed rounding.
     pub fn all(values: &Values, program: &PerSensor<Affine>) -> Vec<Self> {
         let of = |sensor| {
             let (triad, program) = (values.triads.get(sensor), program.get(sensor));
@@ -82,8 +82,8 @@ impl Residual {
             ),
         };
         format!(
-            "{name}: the residual error is up to {:.1} ppm in scale and {:.1} arcsec in misalignment ({example} in \
-             any direction combined), and {bias} in bias",
+            "{name}: the residual error is up to {:.1} ppm in scale and {:.1} arcsec in misalignment ({example} in any \
+             direction combined), and {bias} in bias",
             scale / PPM,
             across.amax() / ARCSEC
         )

@@ -1,7 +1,7 @@
 //! IMU section of a KF-GINS configuration.
 //!
 //! Along front, right, down, from true to measured: `n = (1 + s) u + b` axis by axis, with b in °/h and mGal, s in ppm.
-//! It is corrected as `u = (n − b) / (1 + s)`.
+//! KF-GINS corrects by `u = (n − b) / (1 + s)`.
 //!
 //! Source: the KF-GINS configuration file and its IMU compensation (GIEngine, i2Nav, Wuhan University).
 

@@ -42,7 +42,7 @@ impl<'a> Remarks<'a> {
         }
     }
 
-    /// The same for a program that computes `matrix (n − offset)`: the residual errors are omissions, too.
+    /// Comments for a program that computes `matrix (n − offset)`: the residual errors are omissions, too.
     pub fn of_program(
         values: &'a Values<'a>,
         (mark, reads): (&'static str, &str),
@@ -58,13 +58,13 @@ impl<'a> Remarks<'a> {
         remarks
     }
 
-    /// Without a mention of these error terms.
+    /// A copy that does not mention these error terms.
     pub fn including(mut self, is_included: fn(Term) -> bool) -> Self {
         self.is_included = is_included;
         self
     }
 
-    /// With the axes of the values, their direction or reader, and the divisor of raw output.
+    /// Adds the axes of the values, their direction or reader, and the divisor of raw output.
     pub fn reads(self, what: &str) -> Self {
         let axes = match self.values.order {
             AxisOrder::IDENTITY => "right, front, up",
@@ -82,13 +82,13 @@ impl<'a> Remarks<'a> {
         ])
     }
 
-    /// With further lines.
+    /// Adds further lines.
     pub fn defines(mut self, lines: impl IntoIterator<Item = String>) -> Self {
         self.definitions.extend(lines);
         self
     }
 
-    /// With raw outputs and their calibrated values.
+    /// Adds raw outputs and their calibrated values.
     pub fn with_test_vectors(self) -> Self {
         let lines = test_vectors(self.values);
         let blank = (!lines.is_empty()).then(String::new);

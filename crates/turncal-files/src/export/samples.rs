@@ -26,7 +26,7 @@ const TASKS: usize = 64;
 /// The samples of a run to write.
 #[derive(Debug, Clone, Copy)]
 pub struct Samples<'a> {
-    /// Their run.
+    /// The run of the samples.
     pub run: &'a Run,
     /// Correction.
     pub correction: &'a Correction,
@@ -62,8 +62,8 @@ impl Samples<'_> {
         Ok(())
     }
 
-    /// The same into a complete file, compressed if its name ends in `.gz`; an existing file is replaced only with
-    /// `force`.
+    /// Writes the rows into a complete file, compressed if its name ends in `.gz`; an existing file is replaced only
+    /// with `force`.
     pub fn write(&self, path: &Path, force: bool) -> Result<(), FileError> {
         write_whole_with(path, force, |file| {
             write_rows(path, file, |rows| self.rows(rows))

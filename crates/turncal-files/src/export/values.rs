@@ -16,7 +16,7 @@ pub const ORDERS: usize = 3;
 pub enum Axes {
     RightFrontUp,
     FrontRightDown,
-    /// Those of the log of the run, without a run right, front, up.
+    /// Axes of the log of the run; without a run right, front, up.
     Log,
 }
 
@@ -53,8 +53,8 @@ pub struct Normalised {
 }
 
 impl<'a> Values<'a> {
-    /// Without a run, the nominal scale is that of the unit; for counts the calibrated scale factors, rounded to three
-    /// digits.
+    /// The values for a format. Without a run, the unit gives the nominal scale; for counts, the calibrated scale
+    /// factors, rounded to three digits.
     pub fn new(
         record: &'a Calibration,
         run: Option<&Run>,
@@ -85,8 +85,8 @@ impl<'a> Values<'a> {
         })
     }
 
-    /// The unit of `N`. A count is that of a rate or, per second, of an increment; the record does not distinguish
-    /// them.
+    /// The unit of `N`. A count may belong to a rate or, per second, to an increment; the record does not distinguish
+    /// the two.
     pub fn unit(&self, sensor: Sensor) -> String {
         let unit = self.record.unit.as_ref();
         match unit.map(|unit| unit.get(sensor).as_str()) {

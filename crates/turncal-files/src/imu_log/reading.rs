@@ -26,7 +26,7 @@ pub struct Reading<'a> {
     pub duplicates: usize,
     /// Rows without any value.
     blank: usize,
-    /// Rows without some.
+    /// Rows without some values.
     lacking: usize,
 }
 
@@ -178,7 +178,7 @@ impl ImuLog<'_> {
         self.read_by(Sizes::default(), notes)
     }
 
-    /// The same with other limits for the rows in memory.
+    /// As [`Self::read`], with other limits for the rows in memory.
     pub fn read_by(&self, sizes: Sizes, notes: &mut Vec<String>) -> Result<ImuSamples, FileError> {
         let mut known = None;
         loop {

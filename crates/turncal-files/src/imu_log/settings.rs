@@ -1,4 +1,4 @@
-//! What `run.toml` says of the instrument's log, and its columns.
+//! Settings of the instrument's log in `run.toml`, and its columns.
 
 use nalgebra::Vector3;
 

@@ -15,7 +15,7 @@ const SAME: f64 = 1e-6;
 /// Samples without a gap, with integrals in values times samples.
 #[derive(Default)]
 pub struct Course {
-    /// Their start, in samples.
+    /// Start of the samples, in samples.
     pub begin: f64,
     pub sums: [Vec<f64>; 3],
 }
@@ -175,7 +175,7 @@ pub struct Even {
     wander: Wander,
     lag: f64,
     held: Course,
-    /// The next of them.
+    /// The next sample.
     next: f64,
     resampled: Resampled,
 }

@@ -220,7 +220,7 @@ impl Track {
     }
 }
 
-/// The clock of the rows of both.
+/// The clock of the rows of both streams.
 pub fn clock(period: Option<f64>) -> Clock<'static> {
     Clock {
         column: Some(TIME),

@@ -60,7 +60,7 @@ impl<'a> TemperatureColumns<'a> {
         self.names[0]
     }
 
-    /// Ready to read a file.
+    /// Starts to read the columns of a file.
     pub fn start(&self, csv: &mut LogRows) -> Result<Temperatures, FileError> {
         let channels = self.names.iter().map(|&name| {
             Ok(Channel {

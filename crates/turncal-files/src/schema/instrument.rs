@@ -54,7 +54,7 @@ pub struct InstrumentFields<'a> {
 }
 
 impl<'a> Fields<'a> {
-    /// Those of a document whose directory holds the files that it names.
+    /// The fields of a document whose directory contains the files that it names.
     pub fn new(document: Document<'a>, run: &'a RunFile, in_memory: &'a [DataFile]) -> Self {
         Self {
             document,

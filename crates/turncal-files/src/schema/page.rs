@@ -37,19 +37,19 @@ impl Remarks {
         self.add(path, Place::Behind, why);
     }
 
-    /// What an optional field is for; its value, if any, becomes a comment.
+    /// The purpose of an optional field; its value, if any, becomes a comment.
     pub fn suggestion(&mut self, path: &str, why: impl Display) {
         self.add(path, Place::Suggestion, why);
     }
 
-    /// The same for a field that must be completed.
+    /// The purpose of a field that must be completed.
     pub fn open(&mut self, path: &str, why: impl Display) {
         self.suggestion(path, format_args!("TODO: {why}"));
         let field = path.rsplit('.').next().unwrap_or_default();
         self.open.push((field.to_owned(), why.to_string()));
     }
 
-    /// The same for part of a field, on a line before it.
+    /// The purpose of part of a field that must be completed, on a line before it.
     pub fn open_before(&mut self, path: &str, why: impl Display) {
         self.before(path, format_args!("TODO: {why}"));
         self.open.push((String::new(), why.to_string()));

@@ -30,8 +30,8 @@ pub fn read_run(path: &Path) -> Result<Run, FileError> {
     run_of_text(path, &text_of(path)?, Some(path), &[])
 }
 
-/// The same from the text of a `run.toml` located (or assumed) next to this file and read from `source`; the files
-/// that it names may be in memory.
+/// Reads the text of a `run.toml` located (or assumed) next to this file and read from `source`; the files that it
+/// names may be in memory.
 pub fn run_of_text(
     path: &Path,
     text: &str,
@@ -95,7 +95,7 @@ pub fn imu_file_of(path: &Path) -> Result<PathBuf, FileError> {
     Ok(path.parent().unwrap_or(Path::new("")).join(file))
 }
 
-/// Only `[meta]` of a `run.toml`, for a run with unreadable logs.
+/// Reads only `[meta]` of a `run.toml`, for a run with unreadable logs.
 ///
 /// # Errors [`FileError`] if it cannot be read.
 pub fn read_meta(path: &Path) -> Result<BTreeMap<String, String>, FileError> {
@@ -124,7 +124,7 @@ fn run_file(document: Document) -> Result<RunFile, FileError> {
     fill(document, document.of_format(FORMAT)?)
 }
 
-/// The same with numbers and dates of `[meta]` as written.
+/// The document with numbers and dates of `[meta]` as written.
 fn fill<'a, T: Deserialize<'a>>(
     document: Document<'a>,
     mut table: Spanned<DeTable<'a>>,

@@ -53,13 +53,13 @@ pub struct RunFile {
 #[derive(Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SiteFile {
-    /// Latitude, degrees, north positive; needed with a turntable. Default: Earth rate is estimated
+    /// Latitude, degrees, north positive; required with a turntable. Default: turncal estimates Earth rate
     pub latitude_deg: Option<Latitude>,
     /// Longitude, degrees; default 0
     pub longitude_deg: Option<Longitude>,
     /// Height above the ellipsoid, m; default 0 ± 500
     pub height_m: Option<Height>,
-    /// Measured gravity, m/s²; without gravity_sigma_mgal its last digit gives its σ. Default: normal gravity
+    /// Measured gravity, m/s²; without gravity_sigma_mgal, σ follows from its last digit. Default: normal gravity
     pub gravity_m_s2: Option<Gravity>,
     /// 1σ of gravity, mGal
     pub gravity_sigma_mgal: Option<Milligals>,
@@ -70,18 +70,18 @@ pub struct SiteFile {
 pub struct ImuFile {
     /// Log of the IMU, relative to this file
     pub file: String,
-    /// Stream that holds the gyros, in a file with several
+    /// Stream that contains the gyros, in a file with several streams
     pub stream: Option<String>,
     /// Accelerometers that are not in the rows of the gyros
     pub accel_from: Option<AccelFromFile>,
     /// Use a damaged log up to the damage; default false
     pub salvage: Option<bool>,
-    /// What a row holds: whole counts in the sample (pulse), the integral over it (increment) or the mean over it
-    /// (rate)
+    /// Content of a row: whole counts in the sample (pulse), the integral over the sample (increment) or the mean over
+    /// the sample (rate)
     pub output: Output,
-    /// Unit of the gyros: count; rad, deg, arcsec of increments; rad/s, deg/s, mdps, deg/h of rates
+    /// Unit of the gyros: count; for increments rad, deg, arcsec; for rates rad/s, deg/s, mdps, deg/h
     pub gyro_unit: Option<String>,
-    /// Unit of the accelerometers: count; m/s, g*s of increments; m/s^2, g, mg of rates
+    /// Unit of the accelerometers: count; for increments m/s, g*s; for rates m/s^2, g, mg
     pub accel_unit: Option<String>,
     /// End of the range of the gyros, in the unit of a row; samples there are saturated
     pub gyro_full_scale: Option<Positive>,
@@ -93,7 +93,7 @@ pub struct ImuFile {
     pub sample_period_s: Option<Positive>,
     /// Whether a stamp marks the end, the start or the middle of its sample
     pub time_stamp: TimeStamp,
-    /// False if the file holds sections laid end to end; default true
+    /// False if the file contains concatenated sections; default true
     pub continuous: Option<bool>,
     /// Unit of the temperature columns: degC (default), K or degF
     pub temperature_unit: Option<TemperatureUnit>,
@@ -145,15 +145,15 @@ impl ImuFile {
 #[derive(Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AccelFromFile {
-    /// Log of the accelerometers; default that of the gyros
+    /// Log of the accelerometers; default: the log of the gyros
     pub file: Option<String>,
-    /// Stream that holds the accelerometers
+    /// Stream that contains the accelerometers
     pub stream: Option<String>,
     /// Use a damaged log up to the damage
     pub salvage: Option<bool>,
     /// Time column of the accelerometers
     pub time: Option<TimeColumn>,
-    /// Unit of that column
+    /// Unit of the time column of the accelerometers
     pub time_unit: Option<TimeUnitField>,
     /// Time from row to row, s
     pub sample_period_s: Option<Positive>,
@@ -212,9 +212,9 @@ pub enum TimeColumn {
 pub enum TemperatureColumn {
     One(String),
     Triads {
-        /// Temperature column of the gyros, or one for each
+        /// Temperature column of the gyros, or one for each gyro
         gyro: OneOrThree<String>,
-        /// Temperature column of the accelerometers, or one for each
+        /// Temperature column of the accelerometers, or one for each accelerometer
         accel: OneOrThree<String>,
     },
 }
@@ -261,7 +261,7 @@ pub struct StandstillFile {
 pub struct TurntableFile {
     /// Log of the turntable, relative to this file
     pub file: String,
-    /// Stream that holds the attitude, in a file with several
+    /// Stream that contains the attitude, in a file with several streams
     pub stream: Option<String>,
     /// Use a damaged log up to the damage; default false
     pub salvage: Option<bool>,
@@ -273,11 +273,11 @@ pub struct TurntableFile {
     pub columns: TableColumns,
     /// Axis of each angle when all angles are zero, such as z, x, y
     pub axes: Option<Vec<String>>,
-    /// 1σ per axis of the position error, ″: constant in a dwell, new at every position
+    /// 1σ per axis of the position error, ″: constant in a dwell, independent at every position
     pub position_sigma_arcsec: Angle,
     /// 1σ per axis of the white error of each reading, ″
     pub reading_sigma_arcsec: Angle,
-    /// 1σ per axis by which a reading just after a stop is off, fading within a second, ″
+    /// 1σ per axis of the error of a reading just after a stop, ″; fades within a second
     pub settling_sigma_arcsec: Option<Angle>,
     /// 1σ of the base's tilt, ″; switches its estimation on
     pub level_sigma_arcsec: Option<Angle>,
@@ -289,7 +289,7 @@ pub struct TurntableFile {
     pub wobble_sigma_arcsec: Option<Angle>,
     /// 1σ of each encoder's error, once and twice a turn, ″; needs angles
     pub encoder_sigma_arcsec: Option<Angle>,
-    /// Without effect: readings that are taken while the table turns are not used
+    /// No effect, because readings taken while the table turns are not used
     pub time_sigma_ms: Option<Positive>,
 }
 
@@ -320,7 +320,7 @@ pub struct TableColumns {
     pub quaternion: Option<Names<4>>,
     /// Axis angles, degrees, outermost first
     pub angles: Option<Vec<String>>,
-    /// The same as axes of the turntable
+    /// Axis of each angle, as in axes of the turntable
     pub axes: Option<Vec<String>>,
 }
 

@@ -83,7 +83,7 @@ pub enum TimeUnitField {
 }
 
 impl TimeUnitField {
-    /// As in a file.
+    /// The unit of time from its text in a file.
     pub fn of_text(text: &str) -> Self {
         match text.parse() {
             Ok(tick) => Self::Tick(Positive(tick)),
@@ -104,7 +104,7 @@ impl TimeUnitField {
     }
 }
 
-/// This number of column names.
+/// A fixed number of column names.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(try_from = "Vec<String>", into = "Vec<String>")]
 #[schemars(with = "Vec<String>")]

@@ -86,9 +86,9 @@ pub struct Line {
     /// Period of the first stamps, s.
     period: f64,
     last: f64,
-    /// Unchanged stamps …
+    /// Sums over the unchanged stamps.
     stamps: Sums,
-    /// … and late rows at the time allowed by the following rows.
+    /// Sums over the stamps, with late rows at the time allowed by the following rows.
     placed: Sums,
     knots: Knots,
     /// Stamps that may be farthest below and above a line.

@@ -40,15 +40,15 @@ impl Clock<'_> {
 /// Position of a row by its stamp: number of kept rows before it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stamp {
-    /// It is taken.
+    /// The row is taken, after this number of kept rows.
     New(usize),
-    /// The same stamp as the previous row.
+    /// The stamp equals that of the previous row.
     Again(usize),
 }
 
 /// A pause so long that its remainder is omitted.
 struct Pause {
-    /// Time of the row after it, with shortened pauses, s.
+    /// Time of the row after the pause, with shortened pauses, s.
     until: f64,
     /// Total shortening up to here, s.
     left_out: f64,
@@ -90,14 +90,14 @@ pub struct Stamps {
     standing: usize,
     /// Rows with the time but not the values of another, and the line of the first.
     at_once: (usize, u64),
-    /// Time in s and line of each row kept …
+    /// Time in s and line of each row kept.
     pub of_rows: Vec<(f64, u64)>,
-    /// … and number of rows before them.
+    /// Number of rows before the rows kept.
     let_go: usize,
 }
 
 impl Stamps {
-    /// The same if times must be unique.
+    /// A copy for which times must be unique.
     pub fn without_bursts(self) -> Self {
         Self {
             bursts: false,
@@ -133,7 +133,7 @@ impl Stamps {
             return Err(csv.error_here(
                 "the same time as in the previous row, but other values",
                 "a later time",
-                "Remove the wrong row of the two, or log the time with more digits.",
+                "Remove the wrong one of the two rows, or log the time with more digits.",
             ));
         }
         if self.is_set_to(place, csv)? {
@@ -385,7 +385,7 @@ impl Stamps {
         self.let_go += rows;
     }
 
-    /// Notes on times that step back, and on the resulting ambiguity if this number of samples lack their rows.
+    /// Notes on times that step back, and on the resulting ambiguity if the rows of this number of samples are missing.
     pub fn notes(&self, file: &Path, missing: usize) -> Vec<String> {
         let file = file.display();
         let set = self.set.iter();
@@ -422,8 +422,8 @@ impl Stamps {
             )),
             TimeUnit::Count => (missing > 0).then(|| {
                 format!(
-                    "Rows are missing, and the counter wraps every {} samples ({} s). Each gap may be longer by one \
-                        or more of these periods, and all later times too early by as much. Use a time that does not \
+                    "Rows are missing, and the counter wraps every {} samples ({} s). Each gap may be longer by one or \
+                        more of these periods; all later times are then too early by as much. Use a time that does not \
                         wrap, or split the recording at the gaps.",
                     (size / self.period()).round(),
                     nanoseconds(size)

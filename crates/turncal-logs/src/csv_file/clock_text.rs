@@ -1,6 +1,6 @@
 //! Times as text: a date and time of day, a time of day, or seconds with a fraction that lost its leading zeros.
 
-/// Conversion of the texts of a column to times.
+/// Converts the texts of a column to times.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ClockText {
     /// Digits of fractions written without leading zeros.
@@ -88,7 +88,7 @@ fn parts(text: &str) -> Option<(f64, &str)> {
 }
 
 impl ClockText {
-    /// For a column with these texts in the first rows; `None` if they are plain numbers.
+    /// The conversion for a column with these texts in the first rows; `None` if the texts are plain numbers.
     pub fn of(texts: &[&str]) -> Option<Self> {
         let parts: Vec<_> = texts.iter().filter_map(|text| parts(text)).collect();
         if parts.is_empty() || 2 * parts.len() < texts.len() {

@@ -27,7 +27,7 @@ pub struct Heading {
     pub delimiter: Delimiter,
     /// Column names: `1`, `2`, … if the file has none.
     pub names: Vec<String>,
-    /// Their line; that of the first row if there are no names.
+    /// Line of the names, or of the first row if there are no names.
     pub line: u64,
     /// Column units, if stated.
     pub units: Option<Vec<String>>,
@@ -470,7 +470,7 @@ fn is_number(field: &str) -> bool {
 /// Field separator of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Delimiter {
-    /// This byte.
+    /// One byte.
     Byte(u8),
     /// Any number of spaces and tabs.
     Blanks,

@@ -12,18 +12,18 @@ pub const LONGEST: u64 = 1 << 20;
 const MOST_AHEAD: usize = 1 << 11;
 const BYTES_AHEAD: usize = 1 << 18;
 
-/// A line that is not empty, without what ends it.
+/// A line that is not empty, without its line ending.
 #[derive(Debug, Clone, Default)]
 pub struct Line {
     pub text: Vec<u8>,
     /// Number in the file.
     pub number: u64,
-    /// Whether something ends it, so that it is all there.
+    /// Whether the line has an ending, so that it is complete.
     pub is_ended: bool,
 }
 
 impl Line {
-    /// The text of a comment, if it is one.
+    /// The text of a comment, if the line is one.
     pub fn comment(&self) -> Option<&[u8]> {
         comment(&self.text)
     }
@@ -49,7 +49,7 @@ pub enum Stop {
     System(io::Error),
     /// From this line on, no row ends within [`LONGEST`].
     Endless { line: u64 },
-    /// This line cannot be split into fields.
+    /// A line that cannot be split into fields.
     Malformed { line: u64, what: Malformed },
     /// The bytes are not text.
     Binary,

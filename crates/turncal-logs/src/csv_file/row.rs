@@ -35,8 +35,8 @@ impl Row {
         }
     }
 
-    /// Splits a line without its ending into fields. Quotes enclose a field that begins with one; two of them in it
-    /// stand for one.
+    /// Splits a line without its ending into fields. Quotes enclose a field that begins with a quote; two quotes within
+    /// the field stand for one.
     pub fn split(&mut self, line: &[u8]) -> Result<(), Malformed> {
         self.text.clear();
         self.ends.clear();

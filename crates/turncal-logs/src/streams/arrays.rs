@@ -34,7 +34,7 @@ pub struct Field {
     pub name: String,
     pub kind: Kind,
     pub big_endian: bool,
-    /// Bytes of the item before it.
+    /// Bytes of the item before the number.
     pub place: usize,
 }
 
@@ -45,7 +45,7 @@ impl Array {
         sizes.try_fold(1usize, |all, &size| all.checked_mul(size))
     }
 
-    /// The same if its items fit into this many bytes.
+    /// The field, if the items of the array fit into this many bytes.
     pub fn within(self, bytes: u64, name: &str) -> Result<Self, Broken> {
         let needed = self.items().and_then(|all| all.checked_mul(self.size));
         if needed.is_some_and(|needed| needed as u64 <= bytes) {
@@ -143,12 +143,12 @@ struct Cursor {
     source: Option<Box<dyn Read>>,
     /// Bytes before the first row.
     begin: u64,
-    /// The bytes of the last row read …
+    /// The bytes of the last row read.
     row: Vec<u8>,
-    /// … between rows …
+    /// Bytes between rows.
     stride: u64,
     rows: usize,
-    /// … and the row after it.
+    /// Number of the row after the last row read.
     next: usize,
     cells: Vec<Field>,
     offset: u64,

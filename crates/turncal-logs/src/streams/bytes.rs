@@ -125,9 +125,9 @@ impl Input {
 pub struct Slice<'a> {
     bytes: &'a [u8],
     at: usize,
-    /// Offset of the first byte in the file …
+    /// Offset in the file of the first byte, or of the packed data that contained the bytes.
     base: u64,
-    /// … or of the packed data that contained them.
+    /// Whether the bytes were packed.
     is_packed: bool,
     pub big_endian: bool,
 }
@@ -151,7 +151,7 @@ impl<'a> Slice<'a> {
         }
     }
 
-    /// The same bytes with this byte order.
+    /// A copy with this byte order.
     pub fn in_order(self, big_endian: bool) -> Self {
         Self { big_endian, ..self }
     }
@@ -211,7 +211,7 @@ impl<'a> Slice<'a> {
         self.take(length, what)
     }
 
-    /// The same for a text.
+    /// Text preceded by a length field of this many bytes.
     pub fn measured_text(&mut self, size: usize, what: &str) -> Result<String, Broken> {
         let length = self.length(size, "a length")?;
         self.text(length, what)

@@ -52,7 +52,7 @@ struct Known {
 
 /// Corrections to remove from the samples of a stream.
 pub struct Undo {
-    /// Who applied it.
+    /// Program that applied the correction.
     pub program: &'static str,
     pub corrected: PerSensor<Option<Corrected>>,
     /// Corrections so far, in words.

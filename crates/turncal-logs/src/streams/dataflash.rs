@@ -124,7 +124,7 @@ impl Format {
         Ok(format)
     }
 
-    /// Whether it may belong to an instrument.
+    /// Whether the message may belong to an instrument.
     fn is_inertial(&self) -> bool {
         let stem = self.name.trim_end_matches(|c: char| c.is_ascii_digit());
         ["IMU", "ACC", "GYR"].contains(&stem)

@@ -7,7 +7,7 @@ use super::bytes::Broken;
 pub struct Column {
     /// Name in the file.
     pub name: String,
-    /// In the spelling of `run.toml`; empty if not stated.
+    /// Unit in the spelling of `run.toml`; empty if not stated.
     pub unit: &'static str,
 }
 
@@ -26,11 +26,11 @@ impl Column {
 pub struct Stream {
     /// Name in `run.toml`.
     pub name: String,
-    /// Empty until its first sample, if only that defines them.
+    /// Columns; empty until the first sample if only this sample defines them.
     pub columns: Vec<Column>,
     /// Remarks on its values, one sentence each.
     pub remarks: Vec<String>,
-    /// Whether it may belong to an instrument, according to the format.
+    /// Whether the stream may belong to an instrument, according to the format.
     pub is_inertial: bool,
     /// Name of its body axes, if the format has a convention.
     pub axes: Option<&'static str>,

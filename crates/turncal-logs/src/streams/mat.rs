@@ -18,7 +18,7 @@ const STRUCT: u8 = 2;
 const DEEPEST: usize = 8;
 /// Types of elements, from numbers to texts in UTF-32.
 const TYPES: std::ops::RangeInclusive<u64> = 1..=18;
-/// Nothing deflated is shorter by more.
+/// Deflated data are at most this many times shorter.
 const DEFLATE: u64 = 1040;
 /// Arrays of at most this many times their compressed size are kept in memory; longer ones are unpacked for each column.
 const KEPT: u64 = 16;

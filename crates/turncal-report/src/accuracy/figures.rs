@@ -36,8 +36,8 @@ pub fn figures(accuracy: &Accuracy) -> [Plot; 2] {
              after 40 h; bars: 99 % interval. A bar that crosses the line at 1 is consistent with an optimal filter.",
         ),
         Plot::new("gain.svg", "Gain over the closed form", (1, 460), [gain]).caption(format!(
-            "RMS error of the closed form over that of the EKF in {filter}, with 99 % intervals. Above the line at 1 \
-             the EKF is better, below the closed form.",
+            "RMS error of the closed form divided by the RMS error of the EKF in {filter}, with 99 % intervals. Above \
+             the line at 1 the EKF is better; below, the closed form.",
         )),
     ]
 }

@@ -34,7 +34,7 @@ pub fn document(accuracy: &Accuracy) -> Document {
     document
 }
 
-/// What was studied.
+/// Scenario and settings of the study.
 pub fn facts(accuracy: &Accuracy) -> Facts {
     let (study, scenario) = (&accuracy.study, &accuracy.study.scenario);
     let (form, truth) = accuracy.forms();

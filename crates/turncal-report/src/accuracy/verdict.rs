@@ -31,8 +31,7 @@ pub fn say(document: &mut Document, accuracy: &Accuracy) {
         let not_held: Vec<String> = not_held.map(tables::held).collect();
         sentences.extend((!not_held.is_empty()).then(|| {
             warn(format!(
-                "After 40 h, {}, the position error is within its predicted σ less or more often than it should be: \
-                 {}.",
+                "After 40 h, {}, the position error is within its predicted σ more or less often than expected: {}.",
                 journey_name(of.journey),
                 not_held.join(", ")
             ))
@@ -66,8 +65,8 @@ fn convergence(accuracy: &Accuracy) -> (bool, String) {
     let without = accuracy.trials.iter().filter(|t| t.filtered.is_none());
     let (failed, without) = (count(failed), count(without.count()));
     let text = format!(
-        "{failed} of {runs} runs failed. The {without} of them without an estimate are excluded from every RMS; the \
-         others are included."
+        "{failed} of {runs} runs failed. Every RMS excludes the runs without an estimate ({without}) and includes the \
+         others."
     );
     (false, text)
 }

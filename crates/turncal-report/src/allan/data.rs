@@ -109,7 +109,7 @@ pub fn noise_table(analysis: &NoiseAnalysis) -> String {
     text
 }
 
-/// The same fields with all digits.
+/// The fields of `[imu.noise]` with all digits.
 pub fn fields(analysis: &NoiseAnalysis) -> Map<String, Value> {
     let fields = Sensor::ALL.map(|sensor| of_triad(analysis, sensor));
     let fields = fields.into_iter().flatten();

@@ -10,7 +10,7 @@ const SQRT_HOUR: f64 = 60.0;
 
 /// Presentation of the strength of a process.
 pub struct Quantity {
-    /// Such as `angle random walk N`.
+    /// Name, such as `angle random walk N`.
     pub name: &'static str,
     /// Symbol of the unit.
     pub unit: &'static str,

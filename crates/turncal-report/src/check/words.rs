@@ -50,8 +50,7 @@ pub fn log(run: &Run, survey: &Survey) -> String {
         three_digits(survey.longest),
         match (&run.recording.table, run.recording.segments.len()) {
             (Some(table), _) => format!("table log of {} readings", count(table.time.len())),
-            (None, 0) => "no table log, no labelled sections".to_owned(),
-            (None, labels) => format!("no table log, {labels} labelled sections"),
+            (None, labels) => format!("no table log, {}", several(labels, "labelled section")),
         }
     );
     if let Some(log) = &run.recording.imu.log {
@@ -89,7 +88,7 @@ fn warming(run: &Run) -> String {
     let (one, other) = (of(Sensor::Gyro), of(Sensor::Accel));
     let (span, largest, last) = (one.0.max(other.0), one.1.max(other.1), one.2.max(other.2));
     format!(
-        " It changes by {} K/min at most and {} K/min at the end: {}.",
+        " The temperature changes by {} K/min at most and {} K/min at the end: {}.",
         three_digits(largest * MINUTE),
         three_digits(last * MINUTE),
         if span < SOAKED {
@@ -146,9 +145,14 @@ fn of_motion(survey: &Survey) -> Vec<String> {
         .map(|(way, _)| way_up(way / 2, way % 2 == 1))
         .collect();
     if !missing.is_empty() && survey.directions < DIRECTIONS {
+        let positions = if missing.len() == 1 {
+            "Missing position"
+        } else {
+            "Missing positions"
+        };
         findings.push(format!(
-            "Of the six positions, {} are missing, and only {} upward directions differ by {}° or more. Without a \
-             table, the nine accelerometer parameters need all six positions or {DIRECTIONS} directions.",
+            "{positions}: {}. Only {} upward directions differ by {}° or more; without a table, the nine accelerometer \
+             parameters need all six positions or {DIRECTIONS} directions.",
             missing.join(", "),
             survey.directions,
             degrees(APART)

@@ -74,7 +74,7 @@ pub fn units(lot: &Lot) -> Table {
             100.0 * FALSE_ALARM
         ));
     }
-    table.note("NIS: of all observations, 1 if the σ are correct.")
+    table.note("NIS: mean over all observations, 1 if the σ are correct.")
 }
 
 fn nis(row: &Row) -> String {
@@ -247,11 +247,11 @@ fn notes(lot: &Lot, mut table: Table) -> Table {
     }
     table = match &lot.truth {
         Some(truth) => table.note(format!(
-            "Calibrations: difference from {} ± 1σ; ! beyond {FLAGGED} σ.",
+            "Calibrations: difference from {} ± 1σ; ! marks differences beyond {FLAGGED} σ.",
             truth.unit.name
         )),
         None if lot.rows.len() == 2 => table.note(format!(
-            "± 1σ. The difference is valid only for calibrations from different data; ! beyond {FLAGGED} σ."
+            "± 1σ. The difference is valid only for calibrations from different data; ! marks differences beyond {FLAGGED} σ."
         )),
         None => table,
     };
@@ -260,7 +260,7 @@ fn notes(lot: &Lot, mut table: Table) -> Table {
             .note("Mean: weighted by spread and σ, ± its 1σ. Scatter: sample standard deviation.")
             .note(format!(
                 "χ²/n: scatter compared with the stated σ; p: probability of a larger value if these σ alone explain \
-                 it; ! scatter not explained (false-alarm rate {} % for all rows together).",
+                 it; ! marks scatter that is not explained (false-alarm rate {} % for all rows together).",
                 100.0 * FALSE_ALARM
             ))
             .note("Spread: 1σ between units after subtracting their σ, or its 95 % limit if not significant.");
@@ -311,7 +311,7 @@ pub fn limits(lot: &Lot) -> Table {
     let heading = if is_single {
         "Limits"
     } else {
-        "Limits that are not kept, or not certainly"
+        "Limits that are exceeded or undecided"
     };
     Table::new(heading, columns("unit | | unit | from nominal | limit | P(within) | verdict"))
         .section(rows)

@@ -150,8 +150,8 @@ pub fn table(heading: &str, navigated: &[MethodOutlook]) -> Table {
     Table::new(heading, columns)
         .sections(Quantity::ALL.chunks(3).map(|of| of.iter().map(|&of| row(of))))
         .note(format!(
-            "{what} from the calibration's covariance by the linear error model; of horizontal errors the root of the \
-             mean square."
+            "{what} from the calibration's covariance by the linear error model; for horizontal errors, the root mean \
+             square."
         ))
 }
 

@@ -81,7 +81,7 @@ impl<'a> Layout<'a> {
         }
     }
 
-    /// All of a document's pages.
+    /// All pages of a document.
     pub fn pages(mut self, document: &Document) -> Result<Vec<Vec<Drawn>>, PdfError> {
         self.strong(&document.title, TITLE);
         self.y += 0.6 * TITLE;
@@ -317,7 +317,7 @@ impl<'a> Layout<'a> {
         self.fonts.get(style.bold).width(text, style.size)
     }
 
-    /// As much of a text as fits into a line of this width.
+    /// The part of a text that fits into a line of this width.
     fn shortened(&self, text: &str, style: Style, room: f32) -> String {
         let mut lines = self.broken(text, style, room - self.width("…", style));
         let first = lines.next().unwrap_or_default();

@@ -27,7 +27,7 @@ pub struct Attached {
     pub mime: &'static str,
     /// Description.
     pub description: String,
-    /// Whether it has the same content as the pages, in machine-readable form.
+    /// Whether the file has the same content as the pages, in machine-readable form.
     pub alternative: bool,
     /// Content.
     pub bytes: Vec<u8>,

@@ -35,7 +35,7 @@ pub struct Axis {
     pub room: (f64, f64),
     /// Names at 0, 1, 2 … instead of numbers.
     pub places: Vec<String>,
-    /// Whether it is not drawn, as in a map.
+    /// Whether the axis is not drawn, as in a map.
     pub is_bare: bool,
 }
 

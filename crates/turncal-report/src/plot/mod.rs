@@ -89,7 +89,7 @@ impl Panel {
         self
     }
 
-    /// The same for several.
+    /// Adds several series.
     pub fn with_all(mut self, series: impl IntoIterator<Item = Series>) -> Self {
         self.series.extend(series);
         self

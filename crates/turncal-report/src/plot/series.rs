@@ -72,7 +72,7 @@ pub struct Pen {
 /// Colours that also differ in lightness.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Color {
-    /// Of text.
+    /// Colour of text.
     Ink,
     /// Colour of unobtrusive elements.
     Quiet,
@@ -150,12 +150,12 @@ impl Series {
         Self::whiskers(mark, points.into_iter().map(|at| (at, (at.1, at.1))))
     }
 
-    /// A copy with an interval at each point.
+    /// Marks with an interval at each point.
     pub fn whiskers(mark: Mark, points: impl IntoIterator<Item = (Point, (f64, f64))>) -> Self {
         Self::new(Shape::Marks(mark, points.into_iter().collect()))
     }
 
-    /// The same for values with σ, one standard deviation on both sides.
+    /// Points of values with σ, each with an interval of one standard deviation on both sides.
     pub fn measured(mark: Mark, points: impl IntoIterator<Item = (f64, f64, f64)>) -> Self {
         let points = points.into_iter();
         Self::whiskers(mark, points.map(|(x, y, own)| ((x, y), (y - own, y + own))))

@@ -46,7 +46,7 @@ pub fn draw(on: &mut Canvas, frame: &Frame, series: &Series) {
                 Anchor::Below => ((x, y + 5.0), (HPos::Center, VPos::Top)),
                 Anchor::Middle => ((x, y), (HPos::Center, VPos::Center)),
             };
-            // Words in a cell of a matrix that is too small for them would cover those beside it.
+            // Words in a matrix cell that is too small for them would cover the words of its neighbours.
             if *anchor != Anchor::Middle || frame.x.step(right - left) > width(text, SMALL) {
                 on.text(text, at, lie, color, SMALL)
             }

@@ -1,4 +1,4 @@
-//! What a part of a dwell is given, and what follows for the states.
+//! Quantities given to a part of a dwell, and the resulting states.
 
 use nalgebra::DMatrix;
 
@@ -11,7 +11,8 @@ use crate::calibration::chain::states::{ATTITUDE, POSITION};
 use crate::calibration::record::Rest;
 use crate::navigation::Block;
 
-/// What a part is given, per state and constant: the moving states at its begin except position, then rates and forces.
+/// Quantities given to a part, per state and constant: the moving states at its begin except position, then rates and
+/// forces.
 #[derive(Debug, Clone)]
 pub struct Given {
     pub states: DMatrix<f64>,

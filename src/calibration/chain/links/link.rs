@@ -21,6 +21,6 @@ pub struct Link {
     pub time: f64,
     pub transition: Transition,
     pub rows: Rows,
-    /// What the part is given.
+    /// Quantities given to the part.
     pub given: Given,
 }

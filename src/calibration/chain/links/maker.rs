@@ -28,7 +28,7 @@ pub struct Maker<'a, F> {
     filters: [Box<dyn PartFilter>; 2],
     dispersion: &'a Dispersion,
     dynamics: Dynamics<'a>,
-    /// What happened since the last rows.
+    /// Transition since the last rows.
     pending: Transition,
     take: F,
     pub squares: f64,
@@ -39,7 +39,7 @@ pub struct Maker<'a, F> {
 }
 
 impl<'a, F: FnMut(Link) -> Result<(), CalibrationError>> Maker<'a, F> {
-    /// Before the first stretch; `take` gets each link.
+    /// A maker before the first stretch; `take` gets each link.
     pub fn new(
         (problem, dispersion): (&'a Problem<'a>, &'a Dispersion),
         states: &'a States,

@@ -2,14 +2,14 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// Observations linear in states and constants, each with noise of σ 1.
+/// Observations linear in states and constants, each with noise of σ = 1.
 #[derive(Debug, Clone)]
 pub struct Rows {
-    /// Per state.
+    /// Coefficients of the states.
     pub states: DMatrix<f64>,
-    /// Per constant.
+    /// Coefficients of the constants.
     pub constants: DMatrix<f64>,
-    /// What was observed.
+    /// Observed values.
     pub values: DVector<f64>,
 }
 
@@ -22,7 +22,7 @@ impl Rows {
         }
     }
 
-    /// This number of rows, all zero.
+    /// A copy with this number of rows, all zero.
     pub fn of(self, count: usize) -> Self {
         Self {
             states: DMatrix::zeros(count, self.states.ncols()),
@@ -31,7 +31,7 @@ impl Rows {
         }
     }
 
-    /// With others above them.
+    /// These rows below others.
     pub fn and(self, above: Self) -> Self {
         let (m, k) = (above.values.len(), self.values.len());
         let mut all = above.of_more(k);

@@ -1,4 +1,4 @@
-//! A transition of the states, with what drives it.
+//! A transition of the states, with its disturbances.
 
 use std::ops::Range;
 
@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::calibration::chain::effects::Effect;
 
-/// Independent disturbances of the states with σ 1 each, before the size of their effect.
+/// Independent disturbances of the states with σ = 1 each, before they are scaled by the size of their effect.
 #[derive(Debug, Clone)]
 pub struct Drive {
     pub effect: Effect,
@@ -39,7 +39,7 @@ impl Transition {
         }
     }
 
-    /// Followed by a linear change of the states.
+    /// Appends a linear change of the states.
     pub fn then(&mut self, states: &DMatrix<f64>) {
         self.states = states * &self.states;
         self.constants = states * &self.constants;
@@ -50,13 +50,13 @@ impl Transition {
         self.covariance = states * &self.covariance * states.transpose();
     }
 
-    /// Followed by an effect of constants on the states from a first one on.
+    /// Appends an effect of constants on the states, from the state `first` on.
     pub fn add_constants(&mut self, first: usize, by: &DMatrix<f64>) {
         let mut rows = self.constants.rows_mut(first, by.nrows());
         rows += by;
     }
 
-    /// Followed by a disturbance of the states from a first one on.
+    /// Appends a disturbance of the states, from the state `first` on.
     pub fn drive(&mut self, effect: Effect, event: usize, first: usize, root: &DMatrix<f64>) {
         if root.amax() > 0.0 {
             let mut by = DMatrix::zeros(self.offset.len(), root.ncols());
@@ -65,7 +65,7 @@ impl Transition {
         }
     }
 
-    /// Followed by a new beginning of some states, independent of all before, at these values.
+    /// Resets some states to these values, independently of all earlier ones.
     pub fn reset(&mut self, which: Range<usize>, mean: &[f64]) {
         for (state, mean) in which.zip(mean) {
             self.states.row_mut(state).fill(0.0);

@@ -19,17 +19,18 @@ pub struct StepModel<const M: usize> {
     pub driven: Vec<(usize, usize, f64)>,
 }
 
-/// What is known is kept after this many events, and found again from there: a gain is a sixth of it.
+/// The filter state is kept after every this many events, and recomputed from there: a gain needs a sixth of its
+/// memory.
 const KEPT: usize = 32;
 
 /// The sequence of a part, kept as far as the next one repeats it.
 pub struct Course<const M: usize, const G: usize> {
     pub models: Vec<StepModel<M>>,
-    /// Each event, with its gain if it was an observation.
+    /// All events, with the gains of observations.
     events: Vec<(Event, Option<Gain<M, G>>)>,
-    /// What is known before the first event and after every `KEPT` others …
+    /// Filter states before the first event and after every `KEPT` others.
     kept: Vec<Known<M, G>>,
-    /// … and after the last event.
+    /// Filter state after the last event.
     last: Known<M, G>,
 }
 
@@ -138,7 +139,7 @@ impl<const M: usize, const G: usize> Course<M, G> {
         self.events[from].1.as_ref()
     }
 
-    /// What is known after this number of events.
+    /// The filter state after this number of events.
     pub fn known(&self, at: usize) -> Known<M, G> {
         if at == self.events.len() {
             return self.last.clone();

@@ -12,7 +12,7 @@ pub enum Level {
     Partial,
     /// The values may be used if the finding is taken into account.
     Care,
-    /// The result already accounts for it.
+    /// The result already accounts for the finding.
     Note,
 }
 
@@ -25,7 +25,7 @@ macro_rules! kinds {
         }
 
         impl Kind {
-            /// All in the order of their codes.
+            /// All kinds in the order of their codes.
             pub const ALL: &[Self] = &[$(Self::$variant,)*];
 
             /// The code, such as `W07`.

@@ -56,7 +56,7 @@ impl Finding {
         Self::new(Kind::StatementDoubted, doubt, figures)
     }
 
-    /// The same as a note if σ grew by less than half: they include it, and hardly matter more than without it.
+    /// The finding as a note if σ grew by less than half, because σ include the cause.
     pub fn of_growth(self, growth: f64) -> Self {
         if growth < MATTERS {
             self.at(Level::Note)
@@ -79,7 +79,7 @@ impl Finding {
         self.level.unwrap_or_else(of_kind)
     }
 
-    /// Whether it is of this kind.
+    /// Whether the finding is of this kind.
     pub fn is(&self, kind: Kind) -> bool {
         self.kind == kind.name()
     }

@@ -10,10 +10,11 @@ use super::kind::Level;
 /// Whether a calibration may be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Word {
-    /// It converged, its σ agree with its residuals, and all requested parameters are determined.
+    /// The calibration converged, σ agree with the residuals, and all requested parameters are determined.
     #[serde(rename = "good")]
     Good,
-    /// Usable, but what its reasons name made σ grow or overruled a statement.
+    /// The values are usable, but the reasons name a cause that widened σ or a statement that the recording
+    /// contradicts.
     #[serde(rename = "use with care")]
     UseWithCare,
     /// Some of the requested parameters are not determined; the others are usable.

@@ -129,8 +129,8 @@ impl Canonical {
 }
 
 impl Estimate {
-    /// The same estimate in the general form; parameters that the form fixed get the covariance that
-    /// follows from the form's parameters.
+    /// The estimate in the general form; parameters that the form fixed get the covariance that follows from the form's
+    /// parameters.
     pub fn in_general_form(&self) -> Self {
         let j = self.to_general_form(BodyFrame::Table);
         Self {
@@ -139,7 +139,7 @@ impl Estimate {
         }
     }
 
-    /// Derivatives of the parameters in the general form, in a body frame, with respect to these.
+    /// Derivatives of the parameters in the general form and a body frame with respect to the parameters of this form.
     pub fn to_general_form(&self, body_frame: BodyFrame) -> ParameterMatrix {
         if (self.form(), body_frame) == (InstallationForm::General, BodyFrame::Table) {
             return ParameterMatrix::identity();
@@ -151,8 +151,8 @@ impl Estimate {
     }
 }
 
-/// The same triads, given in any body axes, converted to those of a body frame; unchanged for the table frame, which
-/// they do not determine.
+/// Triads in any body axes, converted to the axes of a body frame; unchanged for the table frame, which they do not
+/// determine.
 pub fn in_body_frame(triads: &PerSensor<Triad>, body_frame: BodyFrame) -> PerSensor<Triad> {
     if body_frame == BodyFrame::Table {
         return *triads;

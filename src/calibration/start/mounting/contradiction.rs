@@ -33,7 +33,7 @@ impl fmt::Display for Contradiction {
             ),
             Self::Exchanged => f.write_str(
                 "the gyro and accelerometer columns are swapped: gravity appears in the columns that run.toml names \
-                 for the gyros. Swap gyro and accel in columns of [imu], with their units and [imu.prior]",
+                 for the gyros. Swap gyro and accel in columns of [imu], and swap their units and [imu.prior]",
             ),
         }
     }

@@ -22,20 +22,20 @@ pub struct TooSmall {
 const FACTORS: [f64; 7] = [1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0];
 
 impl TooSmall {
-    /// Both by any factor.
+    /// Noise and prior too small by any factor.
     pub const ANY: Self = Self {
         noise: &FACTORS,
         prior: &FACTORS,
     };
 
-    /// Noise by at most ten, the prior by three.
+    /// Noise too small by a factor of at most ten, the prior by three.
     pub const CARELESS: Self = Self {
         noise: FACTORS.split_at(3).0,
         prior: FACTORS.split_at(2).0,
     };
 }
 
-/// 1σ of the triad errors, and the factors by which it may be too small.
+/// 1σ of the triad errors, and the factors by which this 1σ may be too small.
 #[derive(Debug, Clone)]
 pub struct Errors {
     pub sigma: ParameterVector,
@@ -74,7 +74,7 @@ impl Likelihoods {
     }
 }
 
-/// With a table, which gives gravity and turns: each triad is tested separately.
+/// Likelihoods with a table, which gives gravity and turns: each triad is tested separately.
 pub fn by_table(
     motion: &Motion,
     errors: &Errors,
@@ -96,7 +96,7 @@ pub fn by_table(
     })
 }
 
-/// With labels, which state the upward axis and the turn axis: each triad is tested separately.
+/// Likelihoods with labels, which state the upward axis and the turn axis: each triad is tested separately.
 pub fn by_labels(motion: &Motion, errors: &Errors, orders: &[AxisOrder]) -> PerSensor<Likelihoods> {
     PerSensor::from_fn(|sensor| {
         Likelihoods::new(errors, orders, |equations, order| {
@@ -109,9 +109,9 @@ pub fn by_labels(motion: &Motion, errors: &Errors, orders: &[AxisOrder]) -> PerS
     })
 }
 
-/// Without both: the gravity direction rotates as sensed by the gyros, and the vertical Earth rate is that of the
-/// latitude, so one triad is tested against the other. Returns the likelihood of each accelerometer order relative to
-/// the gyro axes, with the gyros unchanged and with all of them reversed.
+/// Likelihoods without table and labels: the gravity direction rotates as sensed by the gyros, and the vertical Earth
+/// rate follows from the latitude, so one triad is tested against the other. Returns the likelihood of each
+/// accelerometer order relative to the gyro axes, with the gyros unchanged and with all of them reversed.
 pub fn by_gravity(motion: &Motion, errors: &Errors, orders: &[AxisOrder]) -> [Likelihoods; 2] {
     [0, 1].map(|reversed| {
         Likelihoods::new(errors, orders, |equations, order| {
@@ -270,7 +270,7 @@ fn explained((diagonal, off_diagonal): (&[f64], &[f64]), v: &[f64], r: f64) -> (
     (r * sum, log_determinant)
 }
 
-/// The same if no measurement is as expected: residuals of the size of the measurements.
+/// Likelihood if no measurement is as expected: the residuals are as large as the measurements.
 fn log_likelihood_of_none(equations: &Equations) -> f64 {
     let deviance = equations.weighted().map(|(residual, variance)| {
         let any = 1.0 + variance;

@@ -1,5 +1,5 @@
-//! Axes that are swapped, reversed or left-handed, in either triad or between instrument and table: found before the
-//! first pass and reported with the corrected line for `run.toml`.
+//! Axes that are swapped, reversed or left-handed, in either triad or between instrument and table: turncal finds them
+//! before the first pass and reports the corrected line for `run.toml`.
 //!
 //! Each of the 48 signed permutations of each triad is a hypothesis, weighted by its marginal likelihood: the prior
 //! errors of the triads are integrated out, as are factors by which prior and noise may be stated too small. The
@@ -96,9 +96,9 @@ fn prior_sigma(run: &Run, is_order_known: bool) -> ParameterVector {
 
 /// Likelihood of each axis order.
 struct Hypotheses {
-    /// Of each triad separately, relative to known body axes.
+    /// Likelihood for each triad separately, relative to known body axes.
     each: PerSensor<Likelihoods>,
-    /// Of one triad relative to the other, unchanged and with the gyros reversed.
+    /// Likelihood for one triad relative to the other, unchanged and with the gyros reversed.
     together: Option<[Likelihoods; 2]>,
 }
 
@@ -195,7 +195,7 @@ impl Hypotheses {
 /// Logarithms of the likelihoods for one source of known motion.
 struct Part {
     of: f64,
-    /// For no explanation.
+    /// Likelihood of no explanation.
     none: f64,
     /// The largest likelihood.
     largest: f64,
@@ -215,8 +215,8 @@ impl Part {
     }
 }
 
-/// Each gyro axis order with the logarithm of its likelihood given the motion of a run with the dwells of a problem,
-/// and that of no explanation; the accelerometer axes are as stated.
+/// The logarithm of the likelihood of each gyro axis order, and of no explanation, given the motion of a run with the
+/// dwells of a problem; the accelerometer axes are as stated.
 pub fn orders_of_gyros(problem: &Problem, run: &Run) -> Vec<(AxisOrder, f64, f64)> {
     let hypotheses = Hypotheses::of(problem, run, &Motion::of(problem, 0, run));
     let weighed = |gyro| {

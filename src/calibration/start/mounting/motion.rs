@@ -24,7 +24,7 @@ const LEG: f64 = 1.0;
 /// A vector as measured in column axes, and as known in body axes.
 #[derive(Debug, Clone)]
 pub struct Sensed {
-    /// Divided by gravity or Earth rate, or a rotation angle in rad; without the prior bias.
+    /// Measured vector divided by gravity or Earth rate, or a rotation angle in rad; without the prior bias.
     pub found: Vector3<f64>,
     pub known: Option<Vector3<f64>>,
     /// Variance of each component.
@@ -34,7 +34,7 @@ pub struct Sensed {
 /// A move from one dwell to the next, or a part of it.
 #[derive(Debug, Clone)]
 pub struct Move {
-    /// The dwell before it, by number.
+    /// Number of the dwell before the move.
     pub from: usize,
     /// Rotation matrix from the body axes after the move to those before it, according to the table.
     pub known: Option<Matrix3<f64>>,
@@ -49,9 +49,10 @@ pub struct Move {
 /// A rotation measured by gyros.
 #[derive(Debug, Clone)]
 pub struct Turned {
-    /// `C` from the axes after it to those before.
+    /// `C` from the axes after the rotation to the axes before it.
     pub rotation: Matrix3<f64>,
-    /// Effect of the gyro sensitivity on the total rotation, about the axes before it, rad; zero is the output at rest.
+    /// Effect of the gyro sensitivity on the total rotation, about the axes before the rotation, rad; the zero is the
+    /// output at rest.
     pub partials: OfTriad<3>,
 }
 
@@ -60,7 +61,7 @@ pub struct Turned {
 pub struct Motion {
     /// Dwells: force divided by gravity, rate divided by Earth rate. `known` is set if there is a table log.
     pub rests: Vec<PerSensor<Sensed>>,
-    /// With a table, in parts from reading to reading, because a whole move may end where it started.
+    /// Moves; with a table, parts of moves from reading to reading, because a whole move may end where it started.
     pub moves: Vec<Move>,
     /// Labelled sections: force divided by gravity, or rotation angle.
     pub labels: Vec<(Sensor, Sensed)>,

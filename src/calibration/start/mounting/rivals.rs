@@ -17,9 +17,10 @@ use crate::run::Run;
 use crate::statistics::median;
 
 /// Sensitivities from a tenth to ten times the stated one are tested, which is beyond the next two ranges of an
-/// instrument; wrong units are detected by their nominal scale when run.toml is read …
+/// instrument; wrong units are detected by their nominal scale when run.toml is read.
 const WIDEST: f64 = 10.0;
-/// … each this many times the previous one, so that a residual rotation between two of them is in the linear range.
+/// Each tested sensitivity is this many times the previous one, so that the residual rotation between two of them is in
+/// the linear range.
 const STEP: f64 = 1.1;
 /// Within the widest data-sheet tolerance, 10 %, a stated sensitivity counts as correct for any prior; more than
 /// halfway to the next range, it counts as wrong. In between, it may deviate by this many prior σ.
@@ -215,9 +216,10 @@ fn exchanged(run: &Run) -> Run {
 struct Weighed {
     /// Logarithm of its likelihood with noise and prior close to the stated ones.
     log_likelihood: f64,
-    /// Whether it is hardly more likely with any other noise and prior, and more likely than no explanation.
+    /// Whether the hypothesis is more likely than no explanation, and hardly more likely with any other noise and
+    /// prior.
     is_explained: bool,
-    /// Whether no noise and no prior make it more likely than no explanation.
+    /// Whether the hypothesis is less likely than no explanation for any noise and prior.
     is_nothing: bool,
 }
 
@@ -234,7 +236,7 @@ impl Weighed {
         }
     }
 
-    /// Whether it explains the motion and is more likely than this.
+    /// Whether the hypothesis explains the motion and is more likely than this.
     fn explains(&self, least: f64) -> bool {
         self.is_explained && self.log_likelihood > least
     }

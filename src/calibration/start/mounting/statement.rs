@@ -17,13 +17,13 @@ pub struct Mounting {
     pub orders: PerSensor<AxisOrder>,
     /// Source of the evidence, in a few words.
     pub known_from: &'static str,
-    /// Natural logarithm of the likelihood ratio in its favour.
+    /// Natural logarithm of the likelihood ratio in favour of this order.
     pub log_ratio: f64,
     /// The corrected line for `run.toml`.
     pub line: String,
-    /// Lines for other axis orders that the recording cannot separate from it.
+    /// Lines for other axis orders that the recording cannot separate from this order.
     pub others: Vec<String>,
-    /// Whether a latitude of opposite sign would explain it equally well.
+    /// Whether a latitude of opposite sign would explain the motion equally well.
     pub or_latitude: bool,
     /// Triads whose `[imu.prior]` has values that differ between axes, or biases that change sign with a reversed
     /// column.
@@ -48,7 +48,7 @@ impl fmt::Display for Mounting {
             )?;
         }
         if self.or_latitude {
-            f.write_str("\nA latitude of opposite sign would explain the data equally well.")?;
+            f.write_str("\nA latitude of the opposite sign would explain the data equally well.")?;
         }
         for sensor in &self.prior_differs {
             write!(

@@ -8,9 +8,9 @@ use crate::recording::faults::rows::consecutive;
 
 /// Maximum number of samples used on either side of a hole.
 pub const MOST: usize = 64;
-/// Most intact stretches on either side on which a fill is tested …
+/// Most intact stretches on either side on which a fill is tested.
 const TRIALS: usize = 16;
-/// … and fewest on both sides together.
+/// Fewest intact stretches on both sides together on which a fill is tested.
 const FEWEST_TRIALS: usize = 8;
 /// If the change across the hole exceeds this many times the largest across intact stretches, they do not represent
 /// it.
@@ -156,7 +156,7 @@ impl Fill {
         self.sum_after(axis, 0)
     }
 
-    /// The same for a hole `shift` samples later.
+    /// The sum over a hole `shift` samples later.
     fn sum_after(&self, axis: &[f64], shift: isize) -> f64 {
         let (mut weights, mut sum) = (self.weights.as_slice(), 0.0);
         for run in &self.runs {

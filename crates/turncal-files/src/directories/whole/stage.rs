@@ -22,7 +22,7 @@ static ANNOUNCED: OnceLock<Sender<Beside>> = OnceLock::new();
 /// Whether that thread is about to end the process.
 static ENDING: AtomicBool = AtomicBool::new(false);
 
-/// Error: an output must not replace what is at `target`.
+/// Error: an output must not replace the file or directory at `target`.
 pub fn taken(target: &Path) -> FileError {
     let found = "an existing file or directory of this name";
     let advice = "Choose another name, or add --force to replace it.";
@@ -39,14 +39,14 @@ pub fn unwritable(target: &Path, doing: &str, error: &io::Error) -> FileError {
 pub struct Unfinished(Receiver<Beside>);
 
 impl Unfinished {
-    /// Collects them from here on; `None` if another thread already does.
+    /// Collects unfinished outputs from here on; `None` if another thread already does.
     pub fn of_this_process() -> Option<Self> {
         let (announced, all) = channel();
         ANNOUNCED.set(announced).ok().map(|()| Self(all))
     }
 
-    /// Removes them, for a process that is about to end. Threads that start, finish or abandon an output from here on
-    /// wait for that end.
+    /// Removes the unfinished outputs, for a process that is about to end. Threads that start, finish or abandon an
+    /// output from here on wait for that end.
     pub fn abandon(self) {
         ENDING.store(true, Ordering::SeqCst);
         for beside in self.0.try_iter() {

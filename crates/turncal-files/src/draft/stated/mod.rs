@@ -97,7 +97,7 @@ impl Stated {
 /// Columns of a table that the user states; the others are detected.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct StatedColumns {
-    /// Each triad along right, front and up.
+    /// Columns of each triad along right, front and up.
     pub triads: PerSensor<Option<[String; 3]>>,
     /// Time.
     pub time: Option<String>,
@@ -129,7 +129,7 @@ pub struct StatedUnit(pub Unit);
 impl StatedUnit {
     /// Parses the unit for the triad of this sensor.
     ///
-    /// # Errors The accepted units, if this is none of them.
+    /// # Errors The accepted units, if the text is none of them.
     pub fn parse(sensor: Sensor, text: &str) -> Result<Self, String> {
         let is_of_it = |unit: &Unit| match unit.of {
             Of::Rows(of, _) => of == sensor,

@@ -1,4 +1,4 @@
-//! A possible unit of rows, and what gravity at rest and turns say of it.
+//! A possible unit of rows, and the evidence of gravity at rest and turns.
 
 use crate::draft::motion::Motion;
 use crate::draft::name::Unit;
@@ -22,7 +22,7 @@ pub struct TriadRows<'a> {
     pub is_stated: bool,
     /// Unit named in the file.
     pub named: Option<Unit>,
-    /// Whether they are whole numbers.
+    /// Whether the rows are whole numbers.
     pub whole: bool,
 }
 

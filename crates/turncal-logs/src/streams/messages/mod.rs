@@ -111,7 +111,7 @@ impl Topics {
 /// The log-time column, in s.
 const LOG_TIME: &str = "log_time";
 
-/// Reader of its messages.
+/// Reader of the messages of a topic.
 pub enum Reader {
     Ros(ros::Message),
     Protobuf(protobuf::Message),
@@ -122,7 +122,7 @@ pub enum Reader {
 }
 
 impl Reader {
-    /// For ROS messages, from the text of their definition.
+    /// Reader of ROS messages, from the text of their definition.
     pub fn of_ros(name: &str, definition: &str, encoding: Encoding) -> Self {
         match ros::Message::parse(name, definition, encoding) {
             Ok(message) => Self::Ros(message),

@@ -186,7 +186,7 @@ fn whole(bytes: &[u8], field: u64) -> Option<u64> {
 /// A value of a message.
 struct Value<'a> {
     field: u64,
-    /// How it is stored: as a number of variable length, of eight bytes (1), with its length, or of four bytes (5).
+    /// Storage of the field: a number of variable length, of eight bytes (1), with its length, or of four bytes (5).
     way: u64,
     bits: u64,
     bytes: &'a [u8],

@@ -21,7 +21,8 @@ pub struct Message {
 }
 
 impl Message {
-    /// From the text of its definition, followed by those of the required types; an error message if invalid.
+    /// The type from the text of its definition, followed by the definitions of the required types; an error message if
+    /// invalid.
     pub fn parse(name: &str, definition: &str, encoding: Encoding) -> Result<Self, String> {
         let mut parser = Parser::new(name, definition, encoding);
         let fields = parser.message()?;

@@ -29,7 +29,7 @@ impl Parameters {
         }
     }
 
-    /// Whether it is known which gyros and which accelerometers are selected.
+    /// Whether the selected gyros and accelerometers are known.
     pub fn have_selected(&self) -> bool {
         Sensor::ALL
             .into_iter()

@@ -41,7 +41,7 @@ struct Ulog {
     /// Fields of each named format, as written.
     formats: BTreeMap<String, String>,
     parameters: Parameters,
-    /// Whether PX4 wrote it, with axes front, right, down.
+    /// Whether PX4 wrote the log, with axes front, right, down.
     is_px4: bool,
     streams: Vec<Stream>,
     /// Topics by the number in data messages.

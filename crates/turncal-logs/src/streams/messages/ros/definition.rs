@@ -74,7 +74,7 @@ struct Place<'a> {
 }
 
 impl Parser {
-    /// From a type and the text of its definition, followed by those of the required types.
+    /// A parser for a type and the text of its definition, followed by the definitions of the required types.
     pub fn new(name: &str, definition: &str, encoding: Encoding) -> Self {
         let mut definitions = vec![(name.replace("/msg/", "/"), String::new())];
         for line in definition.lines() {
