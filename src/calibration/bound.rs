@@ -20,7 +20,7 @@ pub struct Bound {
     pub history: Vec<Epoch>,
     /// Prior 1σ of the parameters.
     pub prior_sigma: ParameterVector,
-    /// Which combinations of parameters the record determines.
+    /// Combinations of parameters that the record determines.
     pub observability: Observability,
 }
 

@@ -198,8 +198,8 @@ impl<'a> Problem<'a> {
     pub(in crate::calibration) fn remarks(&self) -> Vec<Finding> {
         let left_out = self.left_out.iter().map(|name| {
             format!(
-                "{name}: excluded because no dwell was found in it. Keep the instrument still for {LONG_ENOUGH} s or \
-                 more between turns."
+                "{name}: turncal excluded this recording because it has no dwell. Keep the instrument still for \
+                 {LONG_ENOUGH} s or more between turns."
             )
         });
         let doubts = self

@@ -39,7 +39,7 @@ pub struct TableAccuracy {
     pub position_sigma: f64,
     /// 1σ per axis of the white error of each reading, rad.
     pub reading_sigma: f64,
-    /// 1σ per axis of a reading just after a stop in addition, rad; it fades within a second.
+    /// 1σ per axis of the additional error of a reading just after a stop, rad; the error fades within a second.
     pub settling_sigma: f64,
     /// 1σ of errors that the reading does not include.
     pub geometry: TableGeometry,
@@ -73,7 +73,7 @@ impl TableErrors {
         *self.of_axes_mut(kind)
     }
 
-    /// A mutable reference to the same.
+    /// A mutable reference to this 1σ.
     pub fn of_axes_mut(&mut self, kind: AxisError) -> &mut f64 {
         match kind {
             AxisError::Tilt => &mut self.nonorthogonality,

@@ -55,7 +55,8 @@ impl Effect {
     }
 }
 
-/// Variance of each effect over that with which the links were made, and of single events over that of their effect.
+/// Variance of each effect relative to the variance with which the links were made, and of single events relative to
+/// their effect.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Sizes {
     effects: BTreeMap<Effect, f64>,
@@ -100,7 +101,7 @@ impl Sizes {
     }
 }
 
-/// Variance of the noise at rest in each dwell over that of all.
+/// Variance of the noise at rest in each dwell, relative to all dwells.
 ///
 /// A dwell with more motion than the others then does not raise their noise: with an inverse-gamma prior of the
 /// variance, the noise of a dwell is a draw from Student's t (Lange, Little, Taylor 1989, J. Am. Stat. Assoc. 84(408)).

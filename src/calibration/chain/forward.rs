@@ -96,7 +96,7 @@ impl Forward {
         }
     }
 
-    /// Through a link.
+    /// Passes a link.
     ///
     /// # Errors
     /// [`CalibrationError::Diverged`] if a covariance is not positive definite.

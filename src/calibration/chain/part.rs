@@ -54,7 +54,7 @@ impl Part {
 
 /// An observation, whitened by its covariance given `g`.
 pub struct Whitened<'a> {
-    /// Number among those of the part.
+    /// Number among the observations of the part.
     pub number: usize,
     /// Three scalars with σ = 1, given `g = 0`.
     pub scalars: Vector3<f64>,

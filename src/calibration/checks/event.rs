@@ -184,8 +184,8 @@ impl EventKind {
             Self::Position => (
                 Kind::PositionWrong,
                 format!(
-                    "The table readings in dwell {number} are wrong by {angle} (at {time:.1} s). turncal gave them \
-                     next to no weight. Check the table log there for a bump or a wrong reading"
+                    "The table readings in dwell {number} are wrong by {angle} (at {time:.1} s). turncal gave these \
+                     readings next to no weight. Check the table log there for a bump or a wrong reading"
                 ),
             ),
             Self::Move => (

@@ -171,8 +171,8 @@ pub fn inconsistent(innovations: &[Innovation], pulses: &[Observation]) -> Optio
     }
     let text = format!(
         "The filter is inconsistent: NIS is outside its 99.9 % interval for {}. Where to look: only after moves – \
-         table position, scale factor or timing; during dwells – bias drift (add --temperature if it follows the temperature); everywhere – the white noise stated in \
-         [imu.noise].",
+         table position, scale factor or timing; during dwells – bias drift (add --temperature if the drift follows \
+         the temperature); everywhere – the white noise stated in [imu.noise].",
         each.join("; ")
     );
     let any = !looks.is_empty();

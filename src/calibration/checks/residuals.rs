@@ -29,7 +29,7 @@ impl Residuals {
         ratio.sqrt().max(1.0)
     }
 
-    /// Limit of χ² if the stated errors are right.
+    /// Limit of χ² if the stated errors are correct.
     fn limit(&self) -> f64 {
         chi_square_limit(self.degrees as f64, FALSE_ALARM / TRIADS)
     }

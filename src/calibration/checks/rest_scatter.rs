@@ -84,8 +84,8 @@ fn of_triad<'a>(
     };
     let text = format!(
         "{} noise at rest is {compared} the stated value: {} instead of {} {symbol} (tolerance −{:.1} % to +{:.1} %). \
-         The estimate uses 0.1 s averages, so vibration of the mount raises it too. Run turncal allan on a long static \
-         recording to separate noise from vibration, and correct {figure}.",
+         The estimate uses 0.1 s averages, so vibration of the mount raises the result too. Run turncal allan on a \
+         long static recording to separate noise from vibration, and correct {figure}.",
         triad_name(sensor),
         shown,
         three_digits(stated),

@@ -21,7 +21,7 @@ use crate::units::DEGREE;
 
 /// Number of summed waves; the others add a thousandth.
 const WAVES: u32 = 600;
-/// Least growth of σ that is reported.
+/// Smallest growth of σ that is reported.
 const SAID: f64 = 1.05;
 
 /// Covariance due to rounding: the rounding errors in the means of dwells, propagated through least squares with the

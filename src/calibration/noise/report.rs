@@ -172,8 +172,7 @@ fn noise_learnt(
     let (words, lines): (Vec<_>, Vec<_>) = named.unzip();
     let text = format!(
         "Noise is larger than stated: {} (squared distance {ratio:.0}; limit {limit:.0}). turncal used its own \
-         estimate, and σ include it. To state this estimate for the next recording, copy into [imu.noise] of run.toml: \
-         {}.",
+         estimate, and σ include it. To state this estimate for the next recording, copy into run.toml: {}.",
         words.join("; "),
         lines.join(", ")
     );

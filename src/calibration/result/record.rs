@@ -239,7 +239,7 @@ pub fn correction_of(
 }
 
 impl TriadRecord {
-    /// σ of the parameters of both triads where they stand in their records, by nominal scales.
+    /// σ of the parameters of both triads at their places in the records, by nominal scales.
     pub fn of_both_sigma(
         form: InstallationForm,
         sigma: &ParameterVector,
@@ -249,7 +249,7 @@ impl TriadRecord {
         PerSensor::from_fn(|sensor| Self::of_sigma(triads.get(sensor), nominal.get(sensor)))
     }
 
-    /// σ of a triad's parameters where they stand in its record, by nominal scales.
+    /// σ of a triad's parameters at their places in the record, by nominal scales.
     fn of_sigma(triad: &Triad, nominal: &Nominal) -> Self {
         let form = triad.form;
         let mut installation = [[0.0; 3]; 3];

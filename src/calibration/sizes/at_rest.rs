@@ -21,7 +21,7 @@ const BEGIN: f64 = 0.1;
 /// Prior 1σ of the constant rates, rad/s, and specific forces, m/s², in a part.
 const RATE: f64 = 1e-3;
 const FORCE: f64 = 0.03;
-/// Degrees of freedom of the prior of a dwell's variance over that of all.
+/// Degrees of freedom of the prior of a dwell's variance relative to all dwells.
 const BEFOREHAND: f64 = 6.0;
 /// Least logarithm of a size over the usual one: a noise a hundred times smaller is that of rounding.
 const LEAST: f64 = -4.605_170_185_988_091;

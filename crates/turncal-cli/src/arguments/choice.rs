@@ -83,7 +83,7 @@ pub const NOISE: [Choice<NoisePolicy>; 4] = [
     ),
     (
         "auto",
-        "Use the stated noise; estimate it from the recording if the two disagree (p < 0.001)",
+        "Use the stated noise; estimate the noise from the recording if the two disagree (p < 0.001)",
         NoisePolicy::Auto,
     ),
     ("estimate", "", NoisePolicy::Auto),

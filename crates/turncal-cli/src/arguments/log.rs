@@ -92,7 +92,7 @@ pub fn run_file(text: &str) -> Result<PathBuf, String> {
     let path = run_or_log(text)?;
     if path.is_file() && path.extension().is_none_or(|end| end != "toml") {
         Err(format!(
-            "found a log, expected the run.toml that describes it. Draft one with turncal init {text}"
+            "found a log, expected the run.toml that describes the log. Draft a run.toml with turncal init {text}"
         ))
     } else {
         Ok(path)

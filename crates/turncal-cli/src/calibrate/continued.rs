@@ -43,7 +43,7 @@ impl Continued {
         let kind = last.filter(|_| !head.contains(&0)).and_then(RowKind::of);
         let Some(kind) = kind else {
             bail!(
-                "found no rows of numbers at its end, expected rows to continue. Name another file"
+                "found no rows of numbers at the end of the file, expected rows to continue. Name another file"
             );
         };
         Ok(Some(Self {

@@ -407,7 +407,7 @@ pub fn read_truth(path: &Path, run: &Run, body_frame: BodyFrame) -> anyhow::Resu
         && *unit != run.instrument.unit
     {
         bail!(
-            "{}: units are {} and {}, but those of the run are {} and {}. Give the truth of this run",
+            "{}: the units are {} and {}, but the units of the run are {} and {}. Give the truth of this run",
             path.display(),
             unit.gyro,
             unit.accel,

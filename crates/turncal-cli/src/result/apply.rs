@@ -127,7 +127,7 @@ fn notes(record: &Calibration, correction: &Correction, run: &Run) -> Vec<String
     }
     if record.unit.is_none() {
         notes.push(
-            "the calibration states no units, so turncal assumed those of the run".to_owned(),
+            "the calibration states no units, so turncal assumed the units of the run".to_owned(),
         );
     }
     for sensor in Sensor::ALL {

@@ -16,7 +16,7 @@ const LONG: f64 = 4.0;
 const STEP: f64 = 1.03;
 /// Parts of this factor that are tried about the best.
 const FINER: i32 = 20;
-/// Trials within this factor of the best are no other.
+/// Trials within this factor of the best count as the best.
 const SAME: f64 = 1.25;
 /// Largest square error of a fitting unit, relative to the error without rotation.
 const GOOD: f64 = 0.1;

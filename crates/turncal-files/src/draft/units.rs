@@ -53,7 +53,7 @@ pub struct Quantities {
 }
 
 impl Quantities {
-    /// If there are too few numeric rows.
+    /// The quantities if there are too few numeric rows.
     pub fn unknown() -> Self {
         Self {
             output: Output::Rate,

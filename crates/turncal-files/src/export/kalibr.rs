@@ -87,7 +87,7 @@ fn noise(values: &Values) -> String {
 /// A triangle and the rotation before it: `A = triangle · rotation`.
 type Split = (Matrix3<f64>, Matrix3<f64>);
 
-/// With a lower triangle of positive diagonal.
+/// The split with a lower triangle of positive diagonal.
 fn lower(a: &Matrix3<f64>) -> Split {
     let rotation = accelerometer_frame(a);
     let mut lower = a * rotation.transpose();
@@ -96,7 +96,7 @@ fn lower(a: &Matrix3<f64>) -> Split {
     (lower, rotation)
 }
 
-/// With an upper triangle of positive diagonal.
+/// The split with an upper triangle of positive diagonal.
 fn upper(a: &Matrix3<f64>) -> Split {
     let reverse = Matrix3::new(0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0);
     let rotation = reverse * accelerometer_frame(&(reverse * a * reverse)) * reverse;

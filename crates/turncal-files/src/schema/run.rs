@@ -285,9 +285,9 @@ pub struct TurntableFile {
     pub north_sigma_arcsec: Option<Angle>,
     /// 1σ of the tilt of each inner axis, ″; needs angles
     pub nonorthogonality_sigma_arcsec: Option<Angle>,
-    /// 1σ of each axis's wobble, once and twice a turn, ″; needs angles
+    /// 1σ of the wobble of each axis, once and twice per turn, ″; needs angles
     pub wobble_sigma_arcsec: Option<Angle>,
-    /// 1σ of each encoder's error, once and twice a turn, ″; needs angles
+    /// 1σ of the error of each encoder, once and twice per turn, ″; needs angles
     pub encoder_sigma_arcsec: Option<Angle>,
     /// No effect, because readings taken while the table turns are not used
     pub time_sigma_ms: Option<Positive>,

@@ -55,7 +55,7 @@ pub fn facts(accuracy: &Accuracy) -> Facts {
     let runs = format!("{}, seed {}", count(accuracy.trials.len()), study.seed);
     facts.push("runs", runs);
     let forms = format!("filter {form}, truth {truth}; compared in the general form");
-    facts.push("installation", forms);
+    facts.push("misalignment", forms);
     facts.push("aiding", aiding);
     facts.push("error terms", terms(accuracy));
     facts.push("table time", table_time(accuracy));

@@ -210,7 +210,7 @@ impl Series {
         self
     }
 
-    /// Names it in the title line.
+    /// Names the series in the title line.
     pub fn key(mut self, text: impl Into<String>) -> Self {
         self.key = Some(text.into());
         self

@@ -28,7 +28,7 @@ pub struct Transition {
 }
 
 impl Transition {
-    /// Keeps all states.
+    /// The transition that keeps all states.
     pub fn identity(states: usize, constants: usize) -> Self {
         Self {
             states: DMatrix::identity(states, states),

@@ -86,9 +86,9 @@ kinds! {
          separate noise from vibration, and state the result in [imu.noise]."
     Inconsistent = "W10" "inconsistent" Care:
         "The normalised innovation squared (NIS) is outside its 99.9 % interval: the residuals are larger or smaller \
-         than predicted. If they are larger only after moves, suspect the table position, a scale factor or a time \
-         offset; if in dwells, bias drift, often due to temperature (--temperature); if everywhere, the white noise \
-         in [imu.noise]."
+         than predicted. If residuals are larger only after moves, suspect the table position, a scale factor or a \
+         time offset; if in dwells, bias drift, often due to temperature (--temperature); if everywhere, the white \
+         noise in [imu.noise]."
     ErrorTermEstimated = "W12" "error-term-estimated" Note:
         "The recording shows a significant error term, so turncal estimated it together with K, E and D. The values \
          are valid only together with this term: `turncal apply` corrects it; export formats without error terms leave \
