@@ -113,7 +113,7 @@ impl TermEvidence {
         let (shown_by, group) = (term.shown_by(), group.title());
         let text = format!(
             "This recording does not show the possible error {name}. σ of {group} are {factor:.2} times as large as \
-             without this term. Add {shown_by}; if the instrument does not have this error, state [imu.terms] {name} = \
+             without this term. Add {shown_by}; if it is absent, state [imu.terms] {name} = \
              {{ sigma = 0 }}."
         );
         Some(Finding::new(Kind::TermNotShown, text, figures))

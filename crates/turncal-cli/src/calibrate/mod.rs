@@ -279,7 +279,6 @@ impl Calibrate {
             solution,
             ..
         } = checked;
-        let missing = self.missing(&calibration);
         if let (Some(directory), Some(document)) = (directory, &document) {
             let file = directory.path().join("calibration.json");
             write_calibration(&calibration, &file, false)?;
@@ -298,12 +297,23 @@ impl Calibrate {
             }
             _ => print(&calibration_json(&calibration, "standard output".as_ref())?)?,
         }
+        self.judge(name, &solution, calibration)
+    }
+
+    /// Fails if the values must not be used, or if what was asked of them is not met.
+    fn judge(
+        &self,
+        name: &str,
+        solution: &Solution,
+        calibration: Calibration,
+    ) -> anyhow::Result<()> {
         if !solution.converged() {
             bail!("{name}: not converged; do not use the values or σ, see the findings");
         }
         if !solution.is_usable() {
             bail!("{name}: do not use the values, see the findings");
         }
+        let missing = self.missing(&calibration);
         if !missing.is_empty() {
             let words = format!("{name}: not determined: {}", missing.join(", "));
             return Err(NotMet::Required(words).into());

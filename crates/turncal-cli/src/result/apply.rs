@@ -54,15 +54,7 @@ pub struct Apply {
 
 impl Apply {
     pub fn run(&self) -> anyhow::Result<()> {
-        if let Some(output) = &self.output {
-            let name = output.to_string_lossy();
-            if !(name.ends_with(".csv") || name.ends_with(".csv.gz")) {
-                let message = format!(
-                    "-o {name}: the output is CSV; give a name that ends in .csv, or in .csv.gz for compression\n"
-                );
-                clap::Error::raw(ErrorKind::ValueValidation, message).exit();
-            }
-        }
+        self.check_output();
         let record = usable(&self.calibration, None, self.force)?;
         let activity = Activity::new(format!("reading {}", self.run.display()));
         let run = self.of_log.open(&self.run)?.run;
@@ -113,6 +105,19 @@ impl Apply {
             tell!("note: {}", printable(&note));
         }
         Ok(())
+    }
+
+    /// Exits if the name of the output is not that of a CSV file.
+    fn check_output(&self) {
+        if let Some(output) = &self.output {
+            let name = output.to_string_lossy();
+            if !(name.ends_with(".csv") || name.ends_with(".csv.gz")) {
+                let message = format!(
+                    "-o {name}: the output is CSV; give a name that ends in .csv, or in .csv.gz for compression\n"
+                );
+                clap::Error::raw(ErrorKind::ValueValidation, message).exit();
+            }
+        }
     }
 }
 
