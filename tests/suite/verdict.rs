@@ -82,7 +82,11 @@ fn noise_that_is_stated_wrongly_is_named_with_the_line_that_states_it() {
     assert_ne!(text, quiet);
     std::fs::write(&run, quiet).unwrap();
     let of_estimate = result(&run, "auto");
-    assert_eq!(of_estimate["verdict"], good);
+    assert_eq!(of_estimate["verdict"]["word"], "use with care");
+    assert_eq!(
+        of_estimate["verdict"]["reasons"],
+        serde_json::json!(["W07"])
+    );
     let findings = of_estimate["findings"].as_array().unwrap();
     let named = findings.iter().find(|finding| finding["code"] == "W07");
     let line = named.unwrap()["figures"]["lines"][0].as_str().unwrap();

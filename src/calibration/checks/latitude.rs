@@ -64,7 +64,7 @@ pub fn earth_rate(problem: &Problem, outcome: &Outcome) -> Option<Finding> {
 /// Relative error of gravity if it was taken from the stated latitude and another one is right; zero if gravity is stated.
 fn by_gravity(site: &Site, latitude: f64) -> f64 {
     let [taken, right] = [site.latitude, latitude].map(|of| normal_gravity(of, site.height));
-    if (taken - site.gravity).abs() < site.gravity_sigma {
+    if (taken - site.gravity).abs() <= site.gravity_sigma {
         (right / taken - 1.0).abs()
     } else {
         0.0

@@ -20,18 +20,18 @@ use std::collections::BTreeSet;
 
 use crate::prelude::*;
 use crate::{navigation, terms, values};
-use turncal::calibration::{Finding, Verdict, Word};
+use turncal::calibration::{Finding, FindingKind, Verdict, Word};
 use turncal::imu::{Noise, Sensor};
 
 pub use report::{ClosedForm, Report};
 pub use solved::{Truth, document, dwell_times, note, within};
 pub use tables::cross_validation;
 
-/// The most severe first; of one level, the first of each kind before more of any.
+/// The most severe first; of one level, the first of each kind before more of any, and before what the reader assumed.
 pub fn in_order(findings: &[Finding]) -> Vec<Finding> {
     let mut seen = BTreeSet::new();
     let keyed = findings.iter().map(|finding| {
-        let is_first = seen.insert(&finding.code);
+        let is_first = seen.insert(&finding.code) && !finding.is(FindingKind::Recording);
         ((finding.level(), !is_first), finding.clone())
     });
     let mut keyed: Vec<_> = keyed.collect();

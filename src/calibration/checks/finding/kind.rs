@@ -76,7 +76,7 @@ kinds! {
         "The gyros do not sense Earth rate well enough to find north. K, E and D do not need the heading, but the \
          gyro biases are less accurate because Earth rate is less certain. If you need the heading, use a table, or \
          gyros with noise below 0.1 °/√h and dwells of one minute."
-    NoiseLearnt = "W07" "noise-learnt" Note:
+    NoiseLearnt = "W07" "noise-learnt" Care:
         "A noise figure in [imu.noise] is more than 1.5 times too small for this recording (false-alarm rate 1 in 1000). \
          turncal used its own estimate for weights and σ. To state the estimate for the next recording, copy the lines \
          of the finding into [imu.noise]; to use the stated noise anyway, add --noise stated."
