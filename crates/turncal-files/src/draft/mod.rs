@@ -217,7 +217,7 @@ impl Draft {
 
     fn exchanged(&self) -> [String; 3] {
         let names = PerSensor::from_fn(|sensor| {
-            let names = self.columns.triads.get(sensor).into_iter().flatten();
+            let names = self.columns.triads.get(sensor).iter().flatten();
             let names = names.map(|column| self.columns.names[*column].as_str());
             names.collect::<Vec<_>>().join(" ")
         });
