@@ -276,7 +276,7 @@ fn a_recording_without_a_dwell_is_left_out_of_a_campaign_and_named() {
     );
     assert_eq!(with.estimate, without.estimate);
     let says = |outcome: &Outcome| {
-        let named = |finding: &Finding| finding.to_string().starts_with("turn: excluded because");
+        let named = |finding: &Finding| finding.to_string().starts_with("turn: turncal excluded");
         outcome
             .findings
             .iter()
