@@ -60,9 +60,13 @@ fn findings(all: &[Finding], width: usize, room: usize) -> Vec<String> {
     };
     let mut lines = Vec::new();
     for (place, finding) in all.iter().enumerate() {
-        let more = of_one(finding);
+        let mut more = of_one(finding);
         let is_last = place + 1 == all.len();
         let fits = lines.len() + more.len() + usize::from(!is_last) <= room;
+        if place == 0 {
+            // At least what is wrong.
+            more.truncate(room.saturating_sub(usize::from(!is_last)).max(LINES));
+        }
         if place == SHOWN || (place > 0 && !fits) {
             let more = all.len() - place;
             lines.push(format!("{CODE}and {more} more"));

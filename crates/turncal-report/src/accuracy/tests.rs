@@ -211,7 +211,7 @@ fn position_errors_beyond_their_predicted_sigma_are_called_so() {
     let doubts = doubts(&accuracy);
     assert!(
         doubts.contains(
-            "stationary, the position error is within its predicted σ less or more often"
+            "stationary, the position error is within its predicted σ more or less often"
         ),
         "{doubts}"
     );

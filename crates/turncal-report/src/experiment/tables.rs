@@ -124,8 +124,8 @@ pub fn estimator_name(experiment: &Experiment, estimator: Estimator) -> String {
 pub fn situation_name(situation: Situation) -> &'static str {
     match situation {
         Situation::SelfAligned => "stationary, self-aligned",
-        Situation::Aligned => "stationary, alignment given",
-        Situation::Moving => "moving, alignment given",
+        Situation::Aligned => "stationary, aligned",
+        Situation::Moving => "moving, aligned",
     }
 }
 
