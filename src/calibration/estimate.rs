@@ -39,6 +39,15 @@ impl Estimate {
         }
     }
 
+    /// The same values, as if these parameters had not been estimated.
+    pub(in crate::calibration) fn without(mut self, parameters: &[usize]) -> Self {
+        for &index in parameters {
+            self.covariance.row_mut(index).fill(0.0);
+            self.covariance.column_mut(index).fill(0.0);
+        }
+        self
+    }
+
     /// The parameters of both triads.
     pub fn vector(&self) -> ParameterVector {
         to_vector(&self.triads)

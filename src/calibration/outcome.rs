@@ -176,17 +176,15 @@ impl Outcome {
 
     /// The estimate as it may be used: parameters that the run did not observe keep their prior values.
     pub fn usable(&self) -> Estimate {
-        let mut values = self.estimate.vector();
-        let mut covariance = self.estimate.covariance;
-        for index in self.unobserved() {
+        let (mut values, unobserved) = (self.estimate.vector(), self.unobserved());
+        for &index in &unobserved {
             values[index] = self.model.prior_mean[index];
-            covariance.row_mut(index).fill(0.0);
-            covariance.column_mut(index).fill(0.0);
         }
-        Estimate {
+        let estimate = Estimate {
             triads: from_vector(self.estimate.form(), &values),
-            covariance,
-        }
+            covariance: self.estimate.covariance,
+        };
+        estimate.without(&unobserved)
     }
 
     /// 1σ of the usable values; zero for parameters that were not estimated.

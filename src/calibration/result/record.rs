@@ -148,9 +148,15 @@ impl AtRest {
     pub fn record(&self, problem: &Problem) -> Calibration {
         let run = problem.run();
         let (estimate, thermal) = self.biases(problem);
+        let (sigma, prior) = (estimate.sigma(), problem.model.prior_sigma);
+        let kept = (0..PARAMETERS).filter(|&index| sigma[index] >= prior[index]);
+        let estimate = estimate.without(&kept.collect::<Vec<_>>());
+        let nominal = &run.instrument.nominal;
+        let sigma = TriadRecord::of_both_sigma(estimate.form(), &sigma, nominal);
         let record = Calibration {
             format: FORMAT_WITH_TEMPERATURE.to_owned(),
             temperature: Some(ThermalRecord::of(&thermal, &estimate, run)),
+            sigma: Some(sigma),
             ..estimate.record(run, problem.model.aiding.body_frame())
         };
         record.with_findings(self.findings.clone())

@@ -145,6 +145,10 @@ impl Calibrate {
                     compare\n";
                 clap::Error::raw(ErrorKind::ArgumentConflict, message).exit();
             }
+            _ if !self.require.is_empty() => {
+                let message = "--require applies to one run; for the units of a lot, give a --specification\n";
+                clap::Error::raw(ErrorKind::ArgumentConflict, message).exit();
+            }
             _ => self.lot(),
         }
     }
@@ -222,7 +226,7 @@ impl Calibrate {
             show(&document, false)
         }?;
         say(&run.recording);
-        Ok(())
+        self.check_required(&run.recording.name, &calibration)
     }
 
     fn campaign(&self, path: &Path) -> anyhow::Result<()> {
@@ -313,11 +317,7 @@ impl Calibrate {
         if !solution.is_usable() {
             bail!("{name}: do not use the values, see the findings");
         }
-        let missing = self.missing(&calibration);
-        if !missing.is_empty() {
-            let words = format!("{name}: not determined: {}", missing.join(", "));
-            return Err(NotMet::Required(words).into());
-        }
+        self.check_required(name, &calibration)?;
         self.decide(name, calibration)
     }
 
@@ -342,11 +342,16 @@ impl Calibrate {
         Ok(())
     }
 
-    /// Required parameters that are not determined.
-    fn missing(&self, calibration: &Calibration) -> Vec<String> {
+    /// Fails if a required parameter is not determined.
+    fn check_required(&self, name: &str, calibration: &Calibration) -> anyhow::Result<()> {
         let is_required = |name: &&String| self.require.iter().any(|of| name.starts_with(of));
-        let names = calibration.undetermined().filter(is_required);
-        names.cloned().collect()
+        let missing = calibration.undetermined().filter(is_required);
+        let missing: Vec<&str> = missing.map(String::as_str).collect();
+        if missing.is_empty() {
+            return Ok(());
+        }
+        let words = format!("{name}: not determined: {}", missing.join(", "));
+        Err(NotMet::Required(words).into())
     }
 }
 

@@ -7,7 +7,7 @@ use crate::prelude::*;
 use turncal::imu::AXES;
 use turncal::run::motion::{Rest, rests};
 
-/// A position is missing if every dwell is farther from it, rad.
+/// A position is missing if every dwell is farther from it, rad: half the angle between two neighbouring positions.
 const FAR: f64 = 45.0 * DEGREE;
 /// Dwells less than this below the rim of a hemisphere are shown in both maps: sine of 5°.
 const RIM: f64 = 0.087;

@@ -17,7 +17,7 @@ pub enum Level {
 }
 
 macro_rules! kinds {
-    ($($variant:ident = $code:literal $name:literal $level:ident: $explanation:literal)*) => {
+    ($($variant:ident = $code:literal $name:literal $level:ident: $explanation:literal $remark:literal)*) => {
         /// Subject of a finding.
         #[derive(Debug, Clone, Copy, PartialEq, Eq)]
         pub enum Kind {
@@ -47,6 +47,11 @@ macro_rules! kinds {
             pub fn explanation(self) -> &'static str {
                 match self { $(Self::$variant => $explanation,)* }
             }
+
+            /// A fact about the results for the customer of a certificate, without advice to the laboratory.
+            pub fn remark(self) -> &'static str {
+                match self { $(Self::$variant => $remark,)* }
+            }
         }
     };
 }
@@ -56,111 +61,143 @@ kinds! {
         "turncal repaired or assumed something when it read the log: it bridged gaps, dropped rows, corrected an \
          uneven clock, or assumed a location or noise figure that run.toml does not state. The σ include the effect. \
          If the text names a field, state it in run.toml. `turncal check` lists all faults of a log."
+        "The record was repaired, or completed by assumptions, before the evaluation; U includes the effect."
     NotConverged = "W02" "not-converged" Failed:
         "A parameter was still changing when the iterations ended, so neither the values nor σ can be used. The \
          usual causes are a wrong scale, unit, sample period or axis in run.toml, or a recording with almost no \
          motion. Run `turncal check`, which compares scale, unit and axes with gravity and the turns."
+        "The evaluation did not converge; the results must not be used."
     Unexplained = "W03" "unexplained" Failed:
         "The residuals are too large for any noise figure, so the values are meaningless. The usual causes are labels \
          or table attitudes from a different recording, a wrong axis order, a wrong unit, or a mount that slipped. \
          Look first at the interval with the largest residuals, which the finding names."
+        "The residuals of the evaluation are unexplained; the results must not be used."
     NotObserved = "W04" "not-observed" Partial:
         "The recording adds little information about these parameters: σ is still more than half of the prior, so \
          turncal keeps their values and σ from [imu.prior]. Add positions that put each axis up and down, and a turn of 90° or more about each axis. \
          `turncal check` predicts the σ of each parameter."
+        "The record adds little to what was assumed about some parameters."
     CombinationsNotObserved = "W05" "combinations-not-observed" Care:
         "Each of these parameters is determined on its own, but a combination of them is not, because their errors \
          cancel in every position of this path. Add positions or turns in which they have different effects. The \
          correlation figure in the report shows which parameters depend on each other."
+        "Some parameters are determined only in combination with others; use them together with the covariance \
+         matrix."
     HeadingNotObserved = "W06" "heading-not-observed" Note:
         "The gyros do not sense Earth rate well enough to find north. K, E and D do not need the heading, but the \
          gyro biases are less accurate because Earth rate is less certain. If you need the heading, use a table, or \
          gyros with noise below 0.1 °/√h and dwells of one minute."
+        "The gyroscopes do not show north; U of the gyroscope biases includes the unknown part of Earth rate."
     NoiseLearnt = "W07" "noise-learnt" Care:
         "A noise figure in [imu.noise] is more than 1.5 times too small for this recording (false-alarm rate 1 in 1000). \
          turncal used its own estimate for weights and σ. To state the estimate for the next recording, copy the lines \
          of the finding into [imu.noise]; to use the stated noise anyway, add --noise stated."
+        "The noise of the instrument was estimated from the record, because it exceeds the stated noise."
     ScatterAtRest = "W08" "scatter-at-rest" Care:
         "You asked for the stated noise, but in dwells the samples scatter more or less than this noise implies. The \
          estimate uses 0.1 s averages, so mount vibration adds to it. Record an hour at rest, run `turncal allan` to \
          separate noise from vibration, and state the result in [imu.noise]."
+        "The noise at standstill differs from the noise stated for the instrument."
     Inconsistent = "W10" "inconsistent" Care:
         "The normalised innovation squared (NIS) is outside its 99.9 % interval: the residuals are larger or smaller \
          than predicted. If residuals are larger only after moves, suspect the table position, a scale factor or a \
          time offset; if in dwells, bias drift, often due to temperature (--temperature); if everywhere, the white \
          noise in [imu.noise]."
+        "The residuals of the evaluation differ from those expected by more than chance explains."
     ErrorTermEstimated = "W12" "error-term-estimated" Note:
         "The recording shows a significant error term, so turncal estimated it together with K, E and D. The values \
          are valid only together with this term: `turncal apply` corrects it; export formats without error terms leave \
          its error in and say so. To leave the term out, list the terms that you want with --with."
+        "The results apply together with the error terms listed in this certificate."
     Settling = "W15" "settling" Note:
         "After stops, the attitude differs from the reading of the table by an angle that fades within seconds. \
          turncal estimated the usual size of this angle, and σ include it. Wait longer after each stop, or state \
          settling_sigma_arcsec in [turntable]."
+        "The turntable settled for some seconds after its moves; U includes the effect."
     PositionWrong = "W16" "position-wrong" Care:
         "The table attitude in one dwell contradicts the gyros and accelerometers. turncal gave the readings of this \
          dwell next to no weight and used the rest. Check the table log for a missed step, a wrong label or a bump at \
          that time."
+        "A reading of the turntable was in error and has practically no weight in the results."
     MoveWrong = "W17" "move-wrong" Care:
         "In one move the integrated gyro angle differs from the change of attitude. turncal estimated the \
          difference. Check that move for lost samples, a rate beyond the gyro range, or a mount that slipped."
+        "The rotation in a move was in error; the error was estimated with the results."
     BiasStep = "W18" "bias-step" Care:
         "A bias changed permanently between two dwells. turncal estimated the step; the calibration contains the mean \
          bias over the recording. Look for a shock or a change of supply voltage or temperature at that time, and \
          repeat the recording if the bias matters."
+        "A bias changed during the calibration; the result is the mean before and after the change."
     EarthRateWrong = "W19" "earth-rate-wrong" Care:
         "In all attitudes, the gyros sense an Earth rate that does not match the stated latitude. turncal estimated \
          the difference. Check latitude_deg (first its sign) and the north and level of the table."
+        "The measured Earth rate differs from that at the stated latitude; the difference was estimated with the \
+         results."
     FarFromPrior = "W20" "far-from-prior" Care:
         "Some parameters are many prior σ away from [imu.prior]. Either run.toml contains a wrong unit, scale, sign \
          or axis order, or the prior σ are too small for this instrument. The finding lists likely causes."
+        "Some parameters differ from the data sheet by much more than it allows."
     FormRejected = "W21" "form-rejected" Care:
         "The data need more angles than the chosen misalignment form has. The values in this form are therefore wrong \
          by more than their σ. Rerun with --installation general."
+        "The instrument has misalignments that the chosen model does not contain; U does not include them."
     Rounded = "W22" "rounded" Care:
         "The log rounds values more coarsely than their noise, so averaging cannot recover the mean within a step. σ \
          include this error. Log more digits or raw counts."
+        "The output of the instrument is rounded to steps larger than its noise; U includes the effect."
     EvenTermsInseparable = "W24" "even-terms-inseparable" Care:
         "When an axis points up or down, the second-order term and the asymmetry of its accelerometer have the same \
          effect. Add dwells with axes at about 45°, or switch off one of the two terms."
+        "The second-order term and the asymmetry of an accelerometer are determined only as a sum."
     TemperatureNotSeen = "W25" "temperature-not-seen" Care:
         "The recording does not show how these parameters change with temperature, so they are valid only at the \
          recorded temperatures. Record positions and turns at several temperatures."
+        "The change of some parameters with temperature was not measured; the results apply at the temperature \
+         of the calibration."
     RecordingsDiffer = "W26" "recordings-differ" Care:
         "The recordings of this instrument differ by more than their σ and [day_to_day] allow. turncal estimated the \
          difference and \
          included it in σ. Usual causes are bias changes at switch-on, remounting, and a temperature sensor away \
          from the inertial sensors."
+        "The instrument changed between the recordings of the calibration; U includes the difference."
     LabelsContradicted = "W27" "labels-contradicted" Care:
         "The labels of some sections contradict gravity or the gyros. The finding names these sections and says \
          whether turncal used them. Correct the labels in the [segments] file."
+        "The labels of some positions contradicted the data and were not used as stated."
     SectionsLost = "W28" "sections-lost" Care:
         "turncal skipped a labelled section because rows are missing there. Record the section again, or remove it \
          from [segments]."
+        "Some positions were not used, because data were missing."
     ResidualsLarge = "W29" "residuals-large" Care:
         "The closed form leaves residuals that stated noise and table errors do not explain. turncal widened all σ by \
          √(χ²/ν), the Birge ratio. The finding names the interval with the largest residual: look there for a bump, a \
          wrong label or a wrong attitude. Otherwise check the noise figures, drifts of bias or scale factors, and the \
          level and north of the table."
+        "The residuals exceed those expected; U was widened in proportion."
     StatementDoubted = "W30" "statement-doubted" Care:
         "run.toml contradicts the log: for example, gravity is far from normal gravity at the site, a column is \
          constant or named twice, or the table log has a different time or clock. Each of these can change the result \
          by more than its σ. Correct the field or log that the finding names."
+        "Some statements about the record contradict its data."
     PriorContradicted = "W31" "prior-contradicted" Failed:
         "A scale factor differs from the stated one by more than 10 prior σ and more than 10 %, or by more than 41 \
          %. The estimate may result from a wrong turn angle or unit. Correct scale, unit or sample_period_s in \
          [imu], or widen scale_sigma_ppm if the sensor really differs that much."
+        "A scale factor contradicts the stated one; the results must not be used."
     VelocityWrong = "W32" "velocity-wrong" Care:
         "In one move the velocity change from the accelerometers is wrong by far more than in other moves. turncal \
          estimated the error. Check that move for lost samples, a force beyond the range, or a bump."
+        "The acceleration in a move was in error; the error was estimated with the results."
     Slipped = "W33" "slipped" Care:
         "From one dwell on, all attitudes are turned by one angle: the instrument slipped on the table, or the table \
          on the ground. turncal estimated the angle, so scale factors and biases are hardly less accurate; the \
          misalignments refer to the mounting before the slip. Fasten the mount and repeat the recording."
+        "The instrument slipped on the turntable; the misalignments apply to the mounting before the slip."
     TermNotShown = "W34" "term-not-shown" Note:
         "This recording cannot show an error term that instruments of this class may have, and K, E or D depend on the \
          term. σ include its usual size. Add the moves that the finding names, or state that the instrument does not \
          have the term: sigma = 0 in [imu.terms]. `--with none` leaves out all terms."
+        "U includes the usual size of error terms that the record does not show."
 }
 
 impl Kind {
