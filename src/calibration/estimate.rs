@@ -1,7 +1,10 @@
 //! Both triads with the covariance of their parameters.
 
 use crate::calibration::budget::curvature::curvature;
-use crate::calibration::{PARAMETERS, ParameterMatrix, ParameterVector, parameter, to_vector};
+use crate::calibration::parameters::Before;
+use crate::calibration::{
+    OBSERVED_BELOW, PARAMETERS, ParameterMatrix, ParameterVector, from_vector, parameter, to_vector,
+};
 use crate::imu::{InstallationForm, PerSensor, Sensor, Triad};
 use crate::run::Run;
 use nalgebra::{DMatrix, DMatrixView};
@@ -39,13 +42,28 @@ impl Estimate {
         }
     }
 
-    /// The same values, as if these parameters had not been estimated.
-    pub(in crate::calibration) fn without(mut self, parameters: &[usize]) -> Self {
-        for &index in parameters {
-            self.covariance.row_mut(index).fill(0.0);
-            self.covariance.column_mut(index).fill(0.0);
+    /// Indices of the parameters that keep more than half of these prior σ.
+    pub fn unobserved(&self, prior_sigma: &ParameterVector) -> Vec<usize> {
+        let sigma = self.sigma();
+        let hidden = |&index: &usize| {
+            let prior = prior_sigma[index];
+            prior > 0.0 && sigma[index] > OBSERVED_BELOW * prior
+        };
+        self.estimated().filter(hidden).collect()
+    }
+
+    /// The estimate as it may be used: unobserved parameters keep these prior values, as if they had not been estimated.
+    pub(in crate::calibration) fn usable(&self, prior: Before<'_>) -> Self {
+        let (mut values, mut covariance) = (self.vector(), self.covariance);
+        for index in self.unobserved(prior.sigma) {
+            values[index] = prior.mean[index];
+            covariance.row_mut(index).fill(0.0);
+            covariance.column_mut(index).fill(0.0);
         }
-        self
+        Self {
+            triads: from_vector(self.form(), &values),
+            covariance,
+        }
     }
 
     /// The parameters of both triads.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 
 use crate::calibration::budget::source::BudgetSource;
-use crate::calibration::parameters::stacked;
+use crate::calibration::parameters::{Before, stacked};
 use crate::calibration::record::standstill::FLOOR;
 use crate::calibration::{DayToDay, ErrorTerm, Options, ParameterVector, to_vector};
 use crate::imu::{
@@ -150,6 +150,14 @@ impl Model {
     /// Variance of the settling of a table at a stop per axis, rad².
     pub(in crate::calibration) fn settling_variance(&self) -> f64 {
         self.settling_sigma.powi(2) * self.weight(BudgetSource::Settling)
+    }
+
+    /// Values and σ of the parameters before a recording.
+    pub(in crate::calibration) fn before(&self) -> Before<'_> {
+        Before {
+            mean: &self.prior_mean,
+            sigma: &self.prior_sigma,
+        }
     }
 
     /// Factor of the variance of a source.

@@ -16,13 +16,14 @@ use crate::calibration::checks::term::{TermEvidence, is_shown};
 use crate::calibration::constants::parameters;
 use crate::calibration::iterations::Solved;
 use crate::calibration::linearisation::{UNKNOWN_HEADING, not_invertible};
+use crate::calibration::parameters::Before;
 use crate::calibration::several::SeparateEstimate;
 use crate::calibration::sizes::{LARGEST, Weighed};
 use crate::calibration::{
     AttitudePrior, Auxiliary, CalibrationError, Candidate, Consistency, Constant, Difference,
     Epoch, Estimate, Finding, FormTest, Innovation, Linearisation, Model, NoiseReport,
-    OBSERVED_BELOW, Observability, ParameterMatrix, ParameterVector, Pass, Posterior, Problem,
-    Thermal, Verdict, Word, from_vector,
+    Observability, ParameterMatrix, ParameterVector, Pass, Posterior, Problem, Thermal, Verdict,
+    Word,
 };
 use crate::imu::Sensor;
 
@@ -174,33 +175,17 @@ impl Outcome {
         4.0 * of_run > HEADING_SEEN
     }
 
-    /// The estimate as it may be used: parameters that the run did not observe keep their prior values.
-    pub fn usable(&self) -> Estimate {
-        let (mut values, unobserved) = (self.estimate.vector(), self.unobserved());
-        for &index in &unobserved {
-            values[index] = self.model.prior_mean[index];
+    /// Values and σ before the recording, as stated.
+    pub(in crate::calibration) fn before(&self) -> Before<'_> {
+        Before {
+            mean: &self.model.prior_mean,
+            sigma: &self.prior_sigma,
         }
-        let estimate = Estimate {
-            triads: from_vector(self.estimate.form(), &values),
-            covariance: self.estimate.covariance,
-        };
-        estimate.without(&unobserved)
-    }
-
-    /// 1σ of the usable values; zero for parameters that were not estimated.
-    pub fn usable_sigma(&self) -> ParameterVector {
-        let mut sigma = self.estimate.sigma();
-        for index in self.unobserved() {
-            sigma[index] = self.prior_sigma[index];
-        }
-        sigma
     }
 
     /// Indices of the parameters that the run did not observe.
     pub fn unobserved(&self) -> Vec<usize> {
-        let sigma = self.estimate.sigma();
-        let hidden = |&i: &usize| sigma[i] > OBSERVED_BELOW * self.prior_sigma[i];
-        self.estimate.estimated().filter(hidden).collect()
+        self.estimate.unobserved(&self.prior_sigma)
     }
 }
 

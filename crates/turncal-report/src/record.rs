@@ -3,15 +3,12 @@
 use super::calibration::{cross_validation, in_order};
 use super::prelude::*;
 use super::values;
-use turncal::calibration::{Calibration, Verdict, Word};
+use turncal::calibration::Calibration;
 
 /// Verdict, findings, values and, beyond one screen, every parameter with its sources of uncertainty.
 pub fn document(calibration: &Calibration, name: &str) -> Document {
     let mut document = Document::new(name);
-    document.verdict = calibration
-        .verdict
-        .as_ref()
-        .map(|of| verdict(calibration, of));
+    document.verdict = values::verdict(calibration);
     document.lead.extend(origin(calibration));
     document.findings = in_order(&calibration.findings);
     document.brief.push(values::table(calibration).into());
@@ -20,15 +17,6 @@ pub fn document(calibration: &Calibration, name: &str) -> Document {
     document.both(noise(calibration));
     document.both(terms(calibration));
     document
-}
-
-fn verdict(calibration: &Calibration, verdict: &Verdict) -> (Word, String) {
-    let of_it = match verdict.word {
-        Word::Failed => "do not use values or σ".to_owned(),
-        _ => values::determined(calibration),
-    };
-    let findings = several(calibration.findings.len(), "finding");
-    (verdict.word, format!("{of_it}, {findings}"))
 }
 
 /// Duration, rate and dwells of the recording.

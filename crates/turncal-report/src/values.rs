@@ -1,7 +1,7 @@
 //! The values of a calibration: K, E and D of each axis with their σ.
 
 use super::prelude::*;
-use turncal::calibration::Calibration;
+use turncal::calibration::{Calibration, Word};
 use turncal::imu::{AXES, Sensor};
 
 /// The unit of raw numbers, for which a scale factor relative to the nominal one says little.
@@ -99,8 +99,22 @@ fn cell(calibration: &Calibration, name: &str, size: f64) -> String {
     }
 }
 
+/// Whether the calibration can be used, and how many parameters were determined.
+pub fn verdict(calibration: &Calibration) -> Option<(Word, String)> {
+    let word = calibration.verdict.as_ref()?.word;
+    let known = calibration.parameters.len();
+    let all = known + calibration.undetermined().count();
+    let of_it = match word {
+        Word::Failed => "do not use values or σ",
+        Word::Partial => &determined(calibration),
+        _ => &format!("{known} of {all} parameters determined"),
+    };
+    let findings = several(calibration.findings.len(), "finding");
+    Some((word, format!("{of_it}, {findings}")))
+}
+
 /// Determined values of each triad, such as `gyros: D only; accelerometers: 9 of 9`.
-pub fn determined(calibration: &Calibration) -> String {
+fn determined(calibration: &Calibration) -> String {
     let of_triad = |sensor: Sensor| {
         let kinds = [("scale", "K"), ("installation", "E"), ("bias", "D")];
         let counts = kinds.map(|(kind, letter)| {

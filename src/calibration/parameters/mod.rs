@@ -102,3 +102,9 @@ pub fn derivatives<const M: usize, const N: usize>(
     };
     SMatrix::from_columns(&std::array::from_fn::<_, N, _>(column))
 }
+/// Values and 1σ of the parameters before a recording.
+#[derive(Debug, Clone, Copy)]
+pub struct Before<'a> {
+    pub mean: &'a ParameterVector,
+    pub sigma: &'a ParameterVector,
+}

@@ -10,7 +10,7 @@ use super::{
     FORMAT_WITH_TEMPERATURE, GravityRecord, Method, NisRecord, NoiseRecord, TermRecord, TestVector,
     TriadRecord, rows,
 };
-use crate::calibration::parameters::factor;
+use crate::calibration::parameters::{Before, factor};
 use crate::calibration::{
     AtRest, Auxiliary, Budget, ClosedForm, Estimate, Finding, Nis, Outcome, PARAMETERS,
     ParameterVector, Problem, Quality, TermEvidence, Verdict, auxiliary_name, from_vector,
@@ -29,8 +29,7 @@ const TEST_INPUTS: [[f64; 6]; 3] = [
 impl Outcome {
     /// The record of this calibration of a problem, with the residuals of gravity and turns.
     pub fn record(&self, problem: &Problem, quality: &Quality) -> Calibration {
-        let (run, usable) = (problem.run(), self.usable());
-        let estimate = &usable;
+        let (run, estimate) = (problem.run(), self.estimate.usable(self.before()));
         let equation = if self.auxiliary.has_terms() {
             EQUATION_WITH_TERMS
         } else {
@@ -41,14 +40,13 @@ impl Outcome {
             None => FORMAT,
         };
         let thermal = self.thermal.as_ref();
-        let nominal = &run.instrument.nominal;
-        let sigma = TriadRecord::of_both_sigma(estimate.form(), &self.usable_sigma(), nominal);
+        let body_frame = problem.model.aiding.body_frame();
         let record = Calibration {
             format: format.to_owned(),
             method: Some(Method::Ekf),
             aiding: Some(problem.model.aiding),
             terms: self.auxiliary.records(),
-            temperature: thermal.map(|thermal| ThermalRecord::of(thermal, estimate, run)),
+            temperature: thermal.map(|thermal| ThermalRecord::of(thermal, &estimate, run)),
             recordings: RecordingRecord::all(self, run),
             gravity: Some(GravityRecord::new(self.gravity)),
             passes: Some(self.passes.len()),
@@ -60,8 +58,7 @@ impl Outcome {
             noise: Some(self.noise_record()),
             equation: Some(equation.to_owned()),
             provenance: Some(problem.provenance()),
-            sigma: Some(sigma),
-            ..estimate.record(run, problem.model.aiding.body_frame())
+            ..self.estimate.usable_record(self.before(), run, body_frame)
         };
         record.with_findings(self.findings.clone())
     }
@@ -99,7 +96,11 @@ impl Calibration {
         outcome: &Outcome,
         budget: &Budget,
     ) {
-        let estimated: Vec<usize> = outcome.usable().estimated().collect();
+        let estimated: Vec<usize> = outcome
+            .estimate
+            .usable(outcome.before())
+            .estimated()
+            .collect();
         let factor = |index| factor(&run.instrument.nominal, index);
         let variance = |index| outcome.estimate.covariance[(index, index)];
         self.budget = Some(budget.record(&estimated, variance, factor));
@@ -136,7 +137,9 @@ impl ClosedForm {
                 run.site.gravity,
                 run.site.gravity_sigma,
             ))),
-            ..self.estimate.record(run, self.reference.body_frame())
+            ..self
+                .estimate
+                .usable_record(problem.model.before(), run, self.reference.body_frame())
         };
         record.with_findings(self.findings.clone())
     }
@@ -148,16 +151,12 @@ impl AtRest {
     pub fn record(&self, problem: &Problem) -> Calibration {
         let run = problem.run();
         let (estimate, thermal) = self.biases(problem);
-        let (sigma, prior) = (estimate.sigma(), problem.model.prior_sigma);
-        let kept = (0..PARAMETERS).filter(|&index| sigma[index] >= prior[index]);
-        let estimate = estimate.without(&kept.collect::<Vec<_>>());
-        let nominal = &run.instrument.nominal;
-        let sigma = TriadRecord::of_both_sigma(estimate.form(), &sigma, nominal);
+        let before = problem.model.before();
+        let body_frame = problem.model.aiding.body_frame();
         let record = Calibration {
             format: FORMAT_WITH_TEMPERATURE.to_owned(),
-            temperature: Some(ThermalRecord::of(&thermal, &estimate, run)),
-            sigma: Some(sigma),
-            ..estimate.record(run, problem.model.aiding.body_frame())
+            temperature: Some(ThermalRecord::of(&thermal, &estimate.usable(before), run)),
+            ..estimate.usable_record(before, run, body_frame)
         };
         record.with_findings(self.findings.clone())
     }
@@ -176,6 +175,18 @@ impl Auxiliary {
 }
 
 impl Estimate {
+    /// The record of the usable values; unobserved parameters are stated with their values and σ before.
+    fn usable_record(&self, before: Before<'_>, run: &Run, body_frame: BodyFrame) -> Calibration {
+        let (mut sigma, nominal) = (self.sigma(), &run.instrument.nominal);
+        for index in self.unobserved(before.sigma) {
+            sigma[index] = before.sigma[index];
+        }
+        Calibration {
+            sigma: Some(TriadRecord::of_both_sigma(self.form(), &sigma, nominal)),
+            ..self.usable(before).record(run, body_frame)
+        }
+    }
+
     /// The record of this estimate, with a model card: equation, correction, test vectors.
     pub fn record(&self, run: &Run, body_frame: BodyFrame) -> Calibration {
         let (form, sigma) = (self.form(), self.sigma());

@@ -14,8 +14,8 @@ use crate::calibration::checks::rounding::{by_rounding, rounded};
 use crate::calibration::checks::unexplained::unexplained_residuals;
 use crate::calibration::linearisation::singular;
 use crate::calibration::{
-    CalibrationError, Estimate, Finding, Model, OBSERVED_BELOW, Problem, checks, from_vector,
-    parameter, parameter_name, to_vector,
+    CalibrationError, Estimate, Finding, Model, Problem, checks, from_vector, parameter,
+    parameter_name, to_vector,
 };
 use crate::calibration::{Verdict, Word};
 use crate::earth::Site;
@@ -243,12 +243,7 @@ fn by_gravity(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
 
 /// Parameters hardly better known than from the prior, if any.
 fn hidden(model: &Model, estimate: &Estimate, reference: Reference) -> Option<Finding> {
-    let sigma = estimate.sigma();
-    let hidden = |&i: &usize| {
-        let prior = model.prior_sigma[i];
-        prior > 0.0 && sigma[i] > OBSERVED_BELOW * prior
-    };
-    let names = estimate.estimated().filter(hidden);
+    let names = estimate.unobserved(&model.prior_sigma).into_iter();
     let hidden: Vec<String> = names
         .filter_map(|index| parameter_name(estimate.form(), index))
         .collect();

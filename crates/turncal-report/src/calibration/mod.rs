@@ -20,7 +20,7 @@ use std::collections::BTreeSet;
 
 use crate::prelude::*;
 use crate::{navigation, terms, values};
-use turncal::calibration::{Finding, FindingKind, Verdict, Word};
+use turncal::calibration::{Finding, FindingKind};
 use turncal::imu::{Noise, Sensor};
 
 pub use report::{ClosedForm, Report};
@@ -43,7 +43,7 @@ impl Report<'_> {
     /// The complete report on the calibration. Its named values are in the calibration file.
     pub fn document(&self) -> Document {
         let mut document = Document::new(self.title);
-        document.verdict = self.verdict();
+        document.verdict = values::verdict(self.calibration);
         document.lead = self.lead();
         document.findings = in_order(self.findings);
         brief::add(&mut document, self);
@@ -130,24 +130,6 @@ impl Report<'_> {
         let closed_form = self.closed_form;
         lead.extend(closed_form.map(|closed| format!("Closed form: {}.", closed.note)));
         lead
-    }
-}
-
-impl Report<'_> {
-    /// Whether the calibration can be used, and how many parameters were determined.
-    pub fn verdict(&self) -> Option<(Word, String)> {
-        let word = Verdict::of(self.findings).word;
-        let estimate = self.estimate()?;
-        let estimated = estimate.estimated().count();
-        let hidden = self.outcome.map_or(0, |outcome| outcome.unobserved().len());
-        let determined = estimated - hidden;
-        let of_it = match word {
-            Word::Failed => "do not use values or σ",
-            Word::Partial => &values::determined(self.calibration),
-            _ => &format!("{determined} of {estimated} parameters determined"),
-        };
-        let findings = several(self.findings.len(), "finding");
-        Some((word, format!("{of_it}, {findings}")))
     }
 }
 
