@@ -163,18 +163,24 @@ fn noise_learnt(
     }
     let named = sources.iter().filter_map(|figures| {
         let stated = figures.stated?;
-        let line = figures.line();
+        let (table, line) = (figures.source.stated_in().0, figures.line());
+        let is_sure = figures.interval.is_none_or(|[low, _]| low > stated);
         let [used, stated_as] = [figures.used, stated].map(three_digits);
         let (name, unit) = (&figures.name, symbol(&figures.unit));
         let words = format!("{name} {used} instead of {stated_as} {unit}");
-        (figures.used > NAMED * stated).then_some((words, line))
+        (is_sure && figures.used > NAMED * stated).then_some((words, (table, line)))
     });
-    let (words, lines): (Vec<_>, Vec<_>) = named.unzip();
+    let (words, lines): (Vec<String>, Vec<(&str, String)>) = named.unzip();
+    let below = lines
+        .iter()
+        .map(|(table, line)| format!("[{table}] {line}"));
+    let below: Vec<String> = below.collect();
+    let lines: Vec<&String> = lines.iter().map(|(_, line)| line).collect();
     let text = format!(
         "Noise is larger than stated: {} (squared distance {ratio:.0}; limit {limit:.0}). turncal used its own \
          estimate, and σ include it. To state this estimate for the next recording, copy into run.toml: {}.",
         words.join("; "),
-        lines.join(", ")
+        below.join(", ")
     );
     let figures = json!({ "ratio": ratio, "limit": limit, "sources": sources, "lines": lines });
     Some(Finding::new(Kind::NoiseLearnt, text, figures))

@@ -91,7 +91,7 @@ kinds! {
     NoiseLearnt = "W07" "noise-learnt" Care:
         "A noise figure in [imu.noise] is more than 1.5 times too small for this recording (false-alarm rate 1 in 1000). \
          turncal used its own estimate for weights and σ. To state the estimate for the next recording, copy the lines \
-         of the finding into [imu.noise]; to use the stated noise anyway, add --noise stated."
+         of the finding into run.toml; to use the stated noise anyway, add --noise stated."
         "The noise of the instrument was estimated from the record, because it exceeds the stated noise."
     ScatterAtRest = "W08" "scatter-at-rest" Care:
         "You asked for the stated noise, but in dwells the samples scatter more or less than this noise implies. The \
