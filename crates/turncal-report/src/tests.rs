@@ -248,7 +248,11 @@ pub fn synthetic(form: InstallationForm) -> Synthetic {
             outlook: mission.outlook(estimate, Some(&truth)).unwrap(),
         })
         .to_vec();
-    let calibration = outcome.estimate.record(&run, run.aiding().body_frame());
+    let calibration = Calibration {
+        verdict: Some(Verdict::of(&outcome.findings)),
+        findings: outcome.findings.clone(),
+        ..outcome.estimate.record(&run, run.aiding().body_frame())
+    };
     Synthetic {
         calibration,
         run,

@@ -137,9 +137,7 @@ impl ClosedForm {
                 run.site.gravity,
                 run.site.gravity_sigma,
             ))),
-            ..self
-                .estimate
-                .usable_record(problem.model.before(), run, self.reference.body_frame())
+            ..self.estimate.record(run, self.reference.body_frame())
         };
         record.with_findings(self.findings.clone())
     }

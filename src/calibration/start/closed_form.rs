@@ -14,7 +14,7 @@ use crate::calibration::checks::rounding::{by_rounding, rounded};
 use crate::calibration::checks::unexplained::unexplained_residuals;
 use crate::calibration::linearisation::singular;
 use crate::calibration::{
-    CalibrationError, Estimate, Finding, Model, Problem, checks, from_vector, parameter,
+    CalibrationError, Estimate, Finding, Level, Model, Problem, checks, from_vector, parameter,
     parameter_name, to_vector,
 };
 use crate::calibration::{Verdict, Word};
@@ -252,5 +252,6 @@ fn hidden(model: &Model, estimate: &Estimate, reference: Reference) -> Option<Fi
         Reference::Labels => "these sections",
         Reference::Gravity => "these dwells and moves",
     };
-    not_observed(by, hidden)
+    // They are stated as the closed form gives them.
+    not_observed(by, hidden).map(|finding| finding.at(Level::Care))
 }
