@@ -1,7 +1,7 @@
 //! The values of a calibration: K, E and D of each axis with their σ.
 
 use super::prelude::*;
-use turncal::calibration::{Calibration, Word};
+use turncal::calibration::{Calibration, FindingKind, Word};
 use turncal::imu::{AXES, Sensor};
 
 /// The unit of raw numbers, for which a scale factor relative to the nominal one says little.
@@ -89,7 +89,8 @@ fn cell(calibration: &Calibration, name: &str, size: f64) -> String {
     };
     let sigma = calibration.sigma_of(name).copied().unwrap_or(0.0);
     let is_estimated = calibration.parameters.iter().any(|of| of == name);
-    let is_fixed = calibration.method.is_none() || (value != 0.0 && sigma == 0.0);
+    // A truth has no σ.
+    let is_fixed = calibration.sigma.is_none() || (value != 0.0 && sigma == 0.0);
     if is_estimated {
         with_last_digits(value / size, sigma / size.abs())
     } else if is_fixed {
@@ -102,8 +103,8 @@ fn cell(calibration: &Calibration, name: &str, size: f64) -> String {
 /// Whether the calibration can be used, and how many parameters were determined.
 pub fn verdict(calibration: &Calibration) -> Option<(Word, String)> {
     let word = calibration.verdict.as_ref()?.word;
-    let known = calibration.parameters.len();
-    let all = known + calibration.undetermined().count();
+    let all = calibration.parameters.len() + calibration.undetermined().count();
+    let known = all - unobserved(calibration);
     let of_it = match word {
         Word::Failed => "do not use values or σ",
         Word::Partial => &determined(calibration),
@@ -111,6 +112,19 @@ pub fn verdict(calibration: &Calibration) -> Option<(Word, String)> {
     };
     let findings = several(calibration.findings.len(), "finding");
     Some((word, format!("{of_it}, {findings}")))
+}
+
+/// Number of parameters that a finding names as not observed.
+fn unobserved(calibration: &Calibration) -> usize {
+    let findings = calibration.findings.iter();
+    let named = findings
+        .filter(|finding| finding.is(FindingKind::NotObserved))
+        .filter_map(|finding| finding.figures["parameters"].as_array());
+    let is_own = |name: &&Value| {
+        let is_it = |own: &String| *name == own;
+        calibration.parameters.iter().any(is_it) || calibration.undetermined().any(is_it)
+    };
+    named.flatten().filter(is_own).count()
 }
 
 /// Determined values of each triad, such as `gyros: D only; accelerometers: 9 of 9`.
@@ -146,4 +160,45 @@ fn determined(calibration: &Calibration) -> String {
     };
     let triads: Vec<String> = Sensor::ALL.into_iter().filter_map(of_triad).collect();
     triads.join("; ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use turncal::calibration::result::TriadRecord;
+    use turncal::calibration::{Finding, Level, Verdict};
+    use turncal::imu::PerSensor;
+
+    /// A calibration of three parameters, of which the recording does not show `gyro.scale.x`.
+    fn calibration(fixed: &[&str], level: Level) -> Calibration {
+        let figures = json!({ "parameters": ["gyro.scale.x"] });
+        let finding = Finding::new(FindingKind::NotObserved, String::new(), figures).at(level);
+        let names = ["gyro.scale.x", "gyro.bias.x", "gyro.bias.y"];
+        let own = |name: &&&str| !fixed.contains(*name);
+        let sigma = TriadRecord {
+            scale: [0.1; 3],
+            ..TriadRecord::default()
+        };
+        Calibration {
+            parameters: names
+                .iter()
+                .filter(own)
+                .map(|name| name.to_string())
+                .collect(),
+            fixed: fixed.iter().map(|name| name.to_string()).collect(),
+            sigma: Some(PerSensor::from_fn(|_| sigma)),
+            verdict: Some(Verdict::of(std::slice::from_ref(&finding))),
+            findings: vec![finding],
+            ..Calibration::default()
+        }
+    }
+
+    #[test]
+    fn what_a_finding_names_is_not_determined_whether_it_kept_its_value_or_not() {
+        let words = |calibration| verdict(&calibration).unwrap().1;
+        let partial = calibration(&["gyro.scale.x"], Level::Partial);
+        assert_eq!(words(partial), "gyros: D only, one finding");
+        let care = calibration(&[], Level::Care);
+        assert_eq!(words(care), "2 of 3 parameters determined, one finding");
+    }
 }
