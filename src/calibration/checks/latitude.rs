@@ -36,10 +36,25 @@ pub fn earth_rate(problem: &Problem, outcome: &Outcome) -> Option<Finding> {
     let sensed = site.earth_rate_n() + rate;
     let fits = sensed.z.atan2(sensed.x.hypot(sensed.y));
     let [fits_deg, stated] = [fits, site.latitude].map(|of| value(of / DEGREE, 1.0));
-    let mut text = format!(
-        "The gyros sense the Earth rate of latitude {fits_deg}°, but {stated}° is stated. turncal estimated Earth rate"
-    );
-    let off = by_gravity(site, fits);
+    // Earth rate to the east turns north; it tells no latitude.
+    let north = rate.x.atan2(sensed.y);
+    let is_north = (fits - site.latitude).abs() < north.abs();
+    let mut text = if is_north {
+        format!(
+            "The north of the table is off by {}°: the gyros sense Earth rate {} of it. turncal estimated Earth rate",
+            value(north.abs() / DEGREE, 0.01),
+            if north > 0.0 { "east" } else { "west" }
+        )
+    } else {
+        format!(
+            "The gyros sense the Earth rate of latitude {fits_deg}°, but {stated}° is stated. turncal estimated Earth rate"
+        )
+    };
+    let off = if is_north {
+        0.0
+    } else {
+        by_gravity(site, fits)
+    };
     let sigmas = off / scale_sigma(outcome);
     if off > 0.0 {
         text += &format!(
@@ -48,14 +63,20 @@ pub fn earth_rate(problem: &Problem, outcome: &Outcome) -> Option<Finding> {
             three_digits(sigmas)
         );
     }
-    text += ". Check latitude_deg and the north and level of the table.";
+    text += if is_north {
+        ", so K, E and D do not depend on it. Correct the azimuth of the table."
+    } else {
+        ". Check latitude_deg and the north and level of the table."
+    };
     let figures = json!({
         "deg_per_h": Vec::from_iter(rate.iter().map(|of| of / DEG_PER_H)), "present": 1.0 - absent,
-        "latitude_deg": fits / DEGREE, "scale_error_ppm": off / PPM
+        "latitude_deg": fits / DEGREE, "north_deg": north / DEGREE, "scale_error_ppm": off / PPM
     });
     let finding = Finding::new(Kind::EarthRateWrong, text, figures);
     Some(if sigmas > USELESS {
         finding.at(Level::Failed)
+    } else if is_north {
+        finding.at(Level::Note)
     } else {
         finding
     })
