@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::clock_text::ClockText;
 use super::lines::{Line, Stop};
 use super::row::{Malformed, Row};
+use super::shape::{Added, Labelled, SEPARATOR, Sample, Stream};
 
 /// Number of rows at the end of the first lines that define the row format.
 const ROWS: usize = 64;
@@ -25,6 +26,8 @@ const SCALES: [(&str, char, &str); 3] = [
 #[derive(Debug, Clone, PartialEq)]
 pub struct Heading {
     pub delimiter: Delimiter,
+    /// Whether each column holds numbers.
+    pub numbers: Vec<bool>,
     /// Column names: `1`, `2`, … if the file has none.
     pub names: Vec<String>,
     /// Line of the names, or of the first row if there are no names.
@@ -180,6 +183,8 @@ struct Named {
     units: Option<Vec<String>>,
     line: u64,
     above: usize,
+    /// Remark on a row above the others that is incomplete.
+    cut: Option<String>,
 }
 
 impl Looks {
@@ -187,8 +192,40 @@ impl Looks {
         Self(lines.map(Look::of).collect())
     }
 
-    /// Heading of all rows, or of those with a tag. None for a file without rows.
-    pub fn heading(&self, tag: Option<(&Tags, &str)>) -> Result<Option<Heading>, Stop> {
+    /// Samples of a labelled stream, and the other lines.
+    pub fn of_stream<'a>(
+        lines: impl Iterator<Item = &'a Line>,
+        labelled: &Labelled,
+        stream: &Stream,
+    ) -> Self {
+        let mut sample = Sample::default();
+        let looks = lines.filter_map(|line| {
+            let mut text = line.text.clone();
+            match sample.add(labelled, stream, &mut text) {
+                Added::Complete => {
+                    let text = text_of(&text);
+                    Some(Look {
+                        number: line.number,
+                        is_comment: false,
+                        delimiter: Delimiter::Byte(SEPARATOR),
+                        fields: Delimiter::Byte(SEPARATOR).fields(&text),
+                        text,
+                    })
+                }
+                Added::Part => None,
+                Added::Nothing if labelled.knows(&line.text) => None,
+                Added::Nothing => Some(Look::of(line)),
+            }
+        });
+        Self(looks.collect())
+    }
+
+    /// Heading of all rows, of those with a tag, or of the samples of a labelled stream. None for a file without rows.
+    pub fn heading(
+        &self,
+        tag: Option<(&Tags, &str)>,
+        labelled: Option<&Stream>,
+    ) -> Result<Option<Heading>, Stop> {
         let is_of_tag =
             |look: &&Look| tag.is_none_or(|(tags, tag)| look.field(tags.column) == Some(tag));
         let rows: Vec<&Look> = self
@@ -210,7 +247,28 @@ impl Looks {
             units,
             line,
             above,
-        } = self.named(&shape, first, tag)?;
+            cut,
+        } = match labelled {
+            Some(stream) if stream.names.iter().any(|name| !name.is_empty()) => {
+                let names = stream.names.iter().zip(1..);
+                let own = |(name, k): (&String, usize)| match &**name {
+                    "" => k.to_string(),
+                    _ => name.clone(),
+                };
+                Named {
+                    names: names.map(own).collect(),
+                    units: Some(stream.units.clone()),
+                    line: self.0.get(first).map_or(0, |look| look.number),
+                    above: 0,
+                    cut: None,
+                }
+            }
+            Some(_) => Named {
+                above: 0,
+                ..self.named(&shape, first, tag)?
+            },
+            None => self.named(&shape, first, tag)?,
+        };
         let rows: Vec<Vec<String>> = rows.iter().filter_map(|row| shape.row(row)).collect();
         let clock = |column: usize| {
             let texts: Vec<&str> = rows
@@ -235,8 +293,12 @@ impl Looks {
             format!("turncal did not apply the orientation {letters} that the file states; the columns were used \
                 unchanged.")
         }));
+        if let Some(cut) = cut {
+            remarks.push(cut);
+        }
         Ok(Some(Heading {
             delimiter: shape.delimiter,
+            numbers: shape.numbers,
             units: units_with(units, &names, &clocks, &says),
             names,
             line,
@@ -283,6 +345,7 @@ impl Looks {
             units,
             line: looks[begin].number,
             above: if tag.is_some() { 0 } else { last + 1 },
+            cut: None,
         })
     }
 
@@ -296,6 +359,7 @@ impl Looks {
             units: None,
             line: looks.get(first).map_or(0, |look| look.number),
             above,
+            cut: None,
         };
         let above = (0..first).rfind(|&k| !looks[k].is_comment && !is_tagged);
         let Some((above, look)) = above.map(|k| (k, &looks[k])) else {
@@ -310,12 +374,26 @@ impl Looks {
         let has_numbers = fields.iter().any(|field| is_number(field));
         Ok(match look.fields(shape.delimiter, columns) {
             None if !is_near => numbered(first),
-            None if has_numbers => numbered(above),
-            fitting => Named {
-                names: fitting.unwrap_or(fields),
-                line: look.number,
-                ..numbered(above + 1)
+            None if has_numbers => Named {
+                cut: Some(format!(
+                    "Line {} has {} fields, the rows below it have {columns}. turncal left it out.",
+                    look.number,
+                    fields.len()
+                )),
+                ..numbered(first)
             },
+            fitting => {
+                let mut names = fitting.unwrap_or(fields);
+                // Rows may lack the field of a remark.
+                if names.len() == columns + 1 {
+                    names.truncate(columns);
+                }
+                Named {
+                    names,
+                    line: look.number,
+                    ..numbered(above + 1)
+                }
+            }
         })
     }
 
@@ -521,17 +599,10 @@ impl Delimiter {
         self.byte() != b','
     }
 
-    /// Leaves one delimiter between two fields, and one after a word followed by a colon and numbers.
+    /// Leaves one delimiter between two fields.
     pub fn tidy(self, line: &mut Vec<u8>) {
         if self == Self::Blanks {
             collapse_blanks(line);
-        }
-        if line.first().is_some_and(u8::is_ascii_alphabetic)
-            && let Some(end) = line.iter().position(|byte| !byte.is_ascii_alphanumeric())
-            && let [b':', next, ..] = line[end..]
-            && (next.is_ascii_digit() || b"+-. ".contains(&next))
-        {
-            line[end] = self.byte();
         }
     }
 
