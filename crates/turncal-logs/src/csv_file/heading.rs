@@ -331,6 +331,16 @@ impl Looks {
             });
             words(*k).is_some() && is_other != Some(true)
         };
+        // A line right above the rows is nearer to them than any other, though rows lack the field of a remark.
+        let above = first.checked_sub(1).and_then(|above| looks.get(above));
+        let columns = shape.numbers.len();
+        let is_longer = above.is_some_and(|look| {
+            let filled = look.words(shape.delimiter, columns + 1);
+            !look.is_comment && filled.is_some_and(|of| of.iter().all(|word| !word.is_empty()))
+        });
+        if is_longer && own.is_none() {
+            return self.unnamed(shape, first, tag.is_some());
+        }
         let Some(last) = own.or_else(|| (0..first).rfind(is_shared)) else {
             return self.unnamed(shape, first, tag.is_some());
         };
@@ -384,13 +394,17 @@ impl Looks {
             },
             fitting => {
                 let mut names = fitting.unwrap_or(fields);
-                // Rows may lack the field of a remark.
-                if names.len() == columns + 1 {
-                    names.truncate(columns);
-                }
+                let is_longer = names.len() == columns + 1;
+                let more = is_longer.then(|| names.pop()).flatten();
                 Named {
                     names,
                     line: look.number,
+                    cut: more.map(|more| {
+                        format!(
+                            "The rows have no field for the last name in line {}, `{more}`.",
+                            look.number
+                        )
+                    }),
                     ..numbered(above + 1)
                 }
             }
