@@ -51,8 +51,9 @@ pub struct CsvFile {
 /// Lines among the rows that are none.
 #[derive(Debug, Default)]
 struct LeftOut {
-    /// Number of rows so far.
+    /// Number of rows so far, and among the first lines.
     rows: usize,
+    ahead: usize,
     count: usize,
     /// Number and text of the first.
     first: Option<(u64, String)>,
@@ -67,7 +68,7 @@ impl LeftOut {
 
     /// Whether so few lines are no rows that the rows are told from them.
     fn are_rare(&self) -> bool {
-        self.count * RARE <= self.rows
+        self.count * RARE <= self.rows.max(self.ahead)
     }
 }
 
@@ -85,10 +86,11 @@ impl CsvFile {
     pub fn open(file: &DataFile, tag: Option<&str>) -> Result<Self, FileError> {
         let stopped = |stop: Stop| stopped(file, &stop);
         let mut lines = Lines::open(source(file)?).map_err(stopped)?;
-        if let Some(error) = not_rows(file, &lines) {
+        let labelled = Labelled::of(lines.ahead());
+        if let Some(error) = not_rows(file, &lines, labelled.is_some()) {
             return Err(error);
         }
-        let labelled = Labelled::of(lines.ahead()).map(|of| {
+        let labelled = labelled.map(|of| {
             let stream = of
                 .stream(tag)
                 .ok_or_else(|| no_tag(file, tag.unwrap_or_default()));
@@ -131,9 +133,12 @@ impl CsvFile {
                 .map(|(tags, tag)| (tags.column, tag.to_owned())),
             line: heading.line,
             numbers: vec![f64::NAN; heading.names.len()],
+            left_out: LeftOut {
+                ahead: heading.rows,
+                ..LeftOut::default()
+            },
             heading,
             labelled,
-            left_out: LeftOut::default(),
             cut: None,
         })
     }
@@ -185,10 +190,11 @@ impl CsvFile {
 }
 
 /// The error for a text that is of another kind by its first line.
-fn not_rows(file: &DataFile, lines: &Lines) -> Option<FileError> {
+fn not_rows(file: &DataFile, lines: &Lines, is_labelled: bool) -> Option<FileError> {
     let first = lines.ahead().next()?.text.trim_ascii_start();
     let (found, advice) = match first.first()? {
-        b'{' => (
+        // Rows may be objects, one in each line.
+        b'{' if first.len() == 1 || !is_labelled => (
             "JSON",
             "Give a log. To show a calibration, run turncal show FILE.",
         ),
@@ -411,5 +417,7 @@ fn malformed(file: &Path, line: u64, what: Malformed) -> FileError {
     FileError::new(file, Place::Line(line), found, expected, advice)
 }
 
+#[cfg(test)]
+mod grammar;
 #[cfg(test)]
 mod tests;

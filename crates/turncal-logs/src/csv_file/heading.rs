@@ -42,6 +42,8 @@ pub struct Heading {
     pub remarks: Vec<String>,
     /// Number of first lines that are not rows.
     pub above: usize,
+    /// Number of rows among the first lines.
+    pub rows: usize,
 }
 
 /// Rows of several kinds, identified by the word or number in one column.
@@ -306,6 +308,7 @@ impl Looks {
             rate: says.iter().find_map(|remark| rate(remark)),
             remarks,
             above,
+            rows: rows.len(),
         }))
     }
 

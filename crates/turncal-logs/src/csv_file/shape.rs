@@ -6,7 +6,7 @@
 use std::collections::HashMap;
 use std::ops::Range;
 
-use super::lines::Line;
+use super::lines::{Line, comment};
 
 /// Stands for a number or time.
 const MARK: u8 = 1;
@@ -29,7 +29,8 @@ struct Marked<'a> {
 
 impl<'a> Marked<'a> {
     fn of(text: &'a [u8], comma: bool) -> Self {
-        let text = without_check_sum(text.trim_ascii());
+        let whole = text.trim_ascii();
+        let text = without_check_sum(whole);
         let (mut marks, mut shape, mut at) = (Vec::new(), Vec::new(), 0);
         let mut is_in_word = false;
         while at < text.len() {
@@ -58,6 +59,9 @@ impl<'a> Marked<'a> {
                 shape.push(byte);
             }
             at += 1;
+        }
+        if text.len() < whole.len() {
+            shape.push(b'*');
         }
         Self { text, marks, shape }
     }
@@ -406,37 +410,36 @@ fn has_decimal_comma(line: &[u8]) -> bool {
     line.iter().any(|byte| matches!(byte, b';' | b'\t')) && fields.into_iter().any(is_decimal)
 }
 
-/// Whether words or signs stand beside numbers in a field, or words between the numbers of a row.
+/// Whether words or signs stand beside numbers in a field, or words between the numbers of a row, or the row begins as
+/// a comment or a sentence of a receiver.
 fn is_labelled(shape: &[u8]) -> bool {
-    let separator = [b';', b'\t', b',', b'|']
-        .into_iter()
-        .find(|byte| shape.contains(byte));
+    let separators = [b';', b'\t', b',', b'|'];
+    let separator = separators.into_iter().find(|byte| shape.contains(byte));
     let is_mark = |byte: &u8| matches!(*byte, MARK | WORD);
-    let is_plain = |field: &[u8]| {
+    let has_mark = |field: &[u8]| field.iter().any(is_mark);
+    let is_mixed = |field: &[u8]| {
         let field = field.trim_ascii();
-        let bare = field
+        let quoted = field
             .strip_prefix(b"\"")
-            .and_then(|of| of.strip_suffix(b"\""))
-            .unwrap_or(field);
-        bare.len() <= 1 || !bare.iter().any(is_mark)
+            .and_then(|of| of.strip_suffix(b"\""));
+        let bare = quoted.unwrap_or(field);
+        bare.len() > 1 && has_mark(bare)
     };
-    let fields: Vec<&[u8]> = match separator {
-        Some(separator) => shape.split(|byte| *byte == separator).collect(),
-        None => shape.split(|byte| *byte == b' ').collect(),
-    };
-    let has_words = |field: &&[u8]| {
-        field
-            .iter()
-            .any(|byte| !is_mark(byte) && !byte.is_ascii_whitespace())
-    };
-    let first = fields.iter().position(|field| field.iter().any(is_mark));
-    let behind = first.map_or(&[][..], |first| &fields[first..]);
-    let changes = behind
-        .windows(2)
-        .filter(|pair| has_words(&pair[0]) && pair[1].iter().any(is_mark));
-    separator == Some(b'|')
-        || !fields.iter().all(|field| is_plain(field))
-        || separator.is_none() && changes.count() > 0
+    let by = separator.unwrap_or(b' ');
+    let fields: Vec<&[u8]> = shape.split(|byte| *byte == by).collect();
+    // Between blanks, a word is that of the number behind it if it says so, or if there is another before it.
+    let first = fields.iter().position(|field| has_mark(field));
+    let mut pairs = fields.windows(2).enumerate();
+    let names_next = pairs.any(|(k, pair)| {
+        let says_so = matches!(pair[0].last(), Some(b':' | b'='));
+        let is_between = first.is_some_and(|first| k > first);
+        !pair[0].is_empty() && !has_mark(pair[0]) && has_mark(pair[1]) && (says_so || is_between)
+    });
+    comment(shape).is_some()
+        || shape.starts_with(b"$")
+        || separator == Some(b'|')
+        || fields.iter().any(|field| is_mixed(field))
+        || separator.is_none() && names_next
 }
 
 /// The kinds of lines that follow each other in turn, if all do.
