@@ -418,6 +418,4 @@ fn malformed(file: &Path, line: u64, what: Malformed) -> FileError {
 }
 
 #[cfg(test)]
-mod grammar;
-#[cfg(test)]
 mod tests;

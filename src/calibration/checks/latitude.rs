@@ -34,43 +34,24 @@ pub fn earth_rate(problem: &Problem, outcome: &Outcome) -> Option<Finding> {
     }
     let site = &problem.run().site;
     let sensed = site.earth_rate_n() + rate;
-    let fits = sensed.z.atan2(sensed.x.hypot(sensed.y));
-    let [fits_deg, stated] = [fits, site.latitude].map(|of| value(of / DEGREE, 1.0));
+    let latitude = sensed.z.atan2(sensed.x.hypot(sensed.y));
     // Earth rate to the east turns north; it tells no latitude.
     let north = rate.x.atan2(sensed.y);
-    let is_north = (fits - site.latitude).abs() < north.abs();
-    let mut text = if is_north {
-        format!(
-            "The north of the table is off by {}°: the gyros sense Earth rate {} of it. turncal estimated Earth rate",
-            value(north.abs() / DEGREE, 0.01),
-            if north > 0.0 { "east" } else { "west" }
-        )
-    } else {
-        format!(
-            "The gyros sense the Earth rate of latitude {fits_deg}°, but {stated}° is stated. turncal estimated Earth rate"
-        )
-    };
+    let is_north = (latitude - site.latitude).abs() < north.abs();
     let off = if is_north {
         0.0
     } else {
-        by_gravity(site, fits)
+        by_gravity(site, latitude)
     };
     let sigmas = off / scale_sigma(outcome);
-    if off > 0.0 {
-        text += &format!(
-            ", but gravity of the wrong latitude makes accelerometer scale factors wrong by {} ppm ({} σ)",
-            three_digits(off / PPM),
-            three_digits(sigmas)
-        );
-    }
-    text += if is_north {
-        ", so K, E and D do not depend on it. Correct the azimuth of the table."
+    let text = if is_north {
+        of_north(north)
     } else {
-        ". Check latitude_deg and the north and level of the table."
+        of_latitude([latitude, site.latitude], (off, sigmas))
     };
     let figures = json!({
         "deg_per_h": Vec::from_iter(rate.iter().map(|of| of / DEG_PER_H)), "present": 1.0 - absent,
-        "latitude_deg": fits / DEGREE, "north_deg": north / DEGREE, "scale_error_ppm": off / PPM
+        "latitude_deg": latitude / DEGREE, "north_deg": north / DEGREE, "scale_error_ppm": off / PPM
     });
     let finding = Finding::new(Kind::EarthRateWrong, text, figures);
     Some(if sigmas > USELESS {
@@ -80,6 +61,33 @@ pub fn earth_rate(problem: &Problem, outcome: &Outcome) -> Option<Finding> {
     } else {
         finding
     })
+}
+
+fn of_north(north: f64) -> String {
+    format!(
+        "The north of the table is off by {}°: the gyros sense Earth rate {} of it. turncal estimated Earth rate, so \
+         K, E and D do not depend on it. Correct the azimuth of the table.",
+        value(north.abs() / DEGREE, 0.01),
+        if north > 0.0 { "east" } else { "west" }
+    )
+}
+
+/// Latitudes as sensed and as stated; the error of the accelerometers' scale factors by gravity, and over its σ.
+fn of_latitude(latitudes: [f64; 2], (off, sigmas): (f64, f64)) -> String {
+    let [sensed, stated] = latitudes.map(|of| value(of / DEGREE, 1.0));
+    let gravity = if off > 0.0 {
+        format!(
+            ", but gravity of the wrong latitude makes accelerometer scale factors wrong by {} ppm ({} σ)",
+            three_digits(off / PPM),
+            three_digits(sigmas)
+        )
+    } else {
+        String::new()
+    };
+    format!(
+        "The gyros sense the Earth rate of latitude {sensed}°, but {stated}° is stated. turncal estimated Earth \
+         rate{gravity}. Check latitude_deg and the north and level of the table."
+    )
 }
 
 /// Relative error of gravity if it was taken from the stated latitude and another one is right; zero if gravity is stated.

@@ -1,6 +1,6 @@
 //! Structure of a text from its first lines: preamble, lines of names and units, and rows, possibly tagged.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::clock_text::ClockText;
 use super::lines::{Line, Stop};
@@ -136,15 +136,22 @@ impl Shape {
     /// From the last rows, because names may be among the first; a last column that is always empty must have a name.
     fn of(rows: &[&Look], all: &[Look]) -> Option<Self> {
         let rows = &rows[rows.len() - ROWS.min(rows.len().div_ceil(2))..];
-        let mut shapes = BTreeMap::new();
-        for row in rows {
-            if let Ok(fields) = &row.fields {
-                *shapes.entry((row.delimiter, fields.len())).or_insert(0) += 1;
+        // A separator is what rows share, and what parts numbers: a note may contain others.
+        let mut shapes = BTreeMap::<_, (usize, usize)>::new();
+        let delimiters: BTreeSet<Delimiter> = rows.iter().map(|row| row.delimiter).collect();
+        let delimiters = delimiters
+            .into_iter()
+            .chain([b',', b';', b'\t'].map(Delimiter::Byte));
+        for (delimiter, row) in delimiters.flat_map(|of| rows.iter().map(move |row| (of, row))) {
+            if let Ok(fields) = delimiter.fields(&row.text) {
+                let (rows, numbers) = shapes.entry((delimiter, fields.len())).or_default();
+                *rows += 1;
+                *numbers += fields.iter().filter(|field| is_number(field)).count();
             }
         }
         let most = shapes
             .into_iter()
-            .max_by_key(|((_, columns), count)| (*count, *columns));
+            .max_by_key(|((_, columns), (rows, numbers))| (*columns > 1, *rows, *numbers));
         let ((delimiter, mut columns), _) = most?;
         let rows = rows.iter().filter_map(|row| row.fields(delimiter, columns));
         let rows: Vec<Vec<String>> = rows.collect();
@@ -250,37 +257,12 @@ impl Looks {
             line,
             above,
             cut,
-        } = match labelled {
-            Some(stream) if stream.names.iter().any(|name| !name.is_empty()) => {
-                let names = stream.names.iter().zip(1..);
-                let own = |(name, k): (&String, usize)| match &**name {
-                    "" => k.to_string(),
-                    _ => name.clone(),
-                };
-                Named {
-                    names: names.map(own).collect(),
-                    units: Some(stream.units.clone()),
-                    line: self.0.get(first).map_or(0, |look| look.number),
-                    above: 0,
-                    cut: None,
-                }
-            }
-            Some(_) => Named {
-                above: 0,
-                ..self.named(&shape, first, tag)?
-            },
-            None => self.named(&shape, first, tag)?,
-        };
+        } = self
+            .of_labels(labelled, first)
+            .map_or_else(|| self.named(&shape, first, tag), Ok)?;
+        let above = if labelled.is_some() { 0 } else { above };
         let rows: Vec<Vec<String>> = rows.iter().filter_map(|row| shape.row(row)).collect();
-        let clock = |column: usize| {
-            let texts: Vec<&str> = rows
-                .iter()
-                .map(|row| row[column].as_str())
-                .filter(|text| !text.is_empty())
-                .collect();
-            ClockText::of(&texts)
-        };
-        let clocks: Vec<_> = (0..shape.numbers.len()).map(clock).collect();
+        let clocks = clocks(&rows, shape.numbers.len());
         let says = self
             .0
             .iter()
@@ -288,16 +270,8 @@ impl Looks {
             .filter(|(k, look)| look.is_comment || *k < above);
         let says: Vec<&str> = says.map(|(_, look)| look.text.as_str()).collect();
         let of_clocks = clocks.iter().zip(&names);
-        let mut remarks: Vec<String> = of_clocks
-            .filter_map(|(clock, name)| clock.as_ref()?.remark(name))
-            .collect();
-        remarks.extend(value(&says, "orientation").map(|letters| {
-            format!("turncal did not apply the orientation {letters} that the file states; the columns were used \
-                unchanged.")
-        }));
-        if let Some(cut) = cut {
-            remarks.push(cut);
-        }
+        let of_clocks = of_clocks.filter_map(|(clock, name)| clock.as_ref()?.remark(name));
+        let remarks = of_clocks.chain(orientation(&says)).chain(cut).collect();
         Ok(Some(Heading {
             delimiter: shape.delimiter,
             numbers: shape.numbers,
@@ -310,6 +284,23 @@ impl Looks {
             above,
             rows: rows.len(),
         }))
+    }
+
+    /// The names that words beside values give them, if there are any.
+    fn of_labels(&self, labelled: Option<&Stream>, first: usize) -> Option<Named> {
+        let stream = labelled.filter(|of| of.names.iter().any(|name| !name.is_empty()))?;
+        let names = stream.names.iter().zip(1..);
+        let own = |(name, k): (&String, usize)| match &**name {
+            "" => k.to_string(),
+            _ => name.clone(),
+        };
+        Some(Named {
+            names: names.map(own).collect(),
+            units: Some(stream.units.clone()),
+            line: self.0.get(first).map_or(0, |look| look.number),
+            above: 0,
+            cut: None,
+        })
     }
 
     /// The line of column names above this row, and its position.
@@ -452,6 +443,24 @@ impl Looks {
             })
         })
     }
+}
+
+/// How the texts of each column are read as times.
+fn clocks(rows: &[Vec<String>], columns: usize) -> Vec<Option<ClockText>> {
+    let clock = |column: usize| {
+        let texts = rows.iter().map(|row| row[column].as_str());
+        let texts: Vec<&str> = texts.filter(|text| !text.is_empty()).collect();
+        ClockText::of(&texts)
+    };
+    (0..columns).map(clock).collect()
+}
+
+/// Remark on an orientation that a preamble states.
+fn orientation(says: &[&str]) -> Option<String> {
+    let letters = value(says, "orientation")?;
+    Some(format!(
+        "turncal did not apply the orientation {letters} that the file states; the columns were used unchanged."
+    ))
 }
 
 /// Whether a column after the first increases in all rows.

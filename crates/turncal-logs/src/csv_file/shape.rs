@@ -580,70 +580,64 @@ fn axis(word: &str) -> Option<char> {
 }
 
 /// Names and units of values. An axis alone belongs to the words before the last one; words before three values name
-/// their axes.
+/// their axes, after a time or not.
 fn named(labels: &[Label]) -> Vec<(String, String)> {
-    let mut named: Vec<(String, String)> = Vec::new();
-    let (mut group, mut unit) = (String::new(), String::new());
-    let mut k = 0;
-    while let Some(label) = labels.get(k) {
-        let run = 1 + labels[k + 1..]
-            .iter()
-            .take_while(|of| of.words.is_empty())
-            .count();
-        let is_axis = label.axis.is_some_and(|_| label.words.chars().count() == 1);
+    let mut named = Vec::new();
+    let mut group = Label::default();
+    let mut rest = labels;
+    while let Some((label, behind)) = rest.split_first() {
+        let run = 1 + (behind.iter().take_while(|of| of.words.is_empty())).count();
+        let (values, others) = rest.split_at(run);
+        rest = others;
+        let is_axis = label.axis.is_some() && label.words.len() == 1;
         if let Some(axis) = label.axis.filter(|_| !is_axis) {
-            label
-                .words
-                .trim_end_matches(axis)
-                .trim()
-                .clone_into(&mut group);
-            label.unit.clone_into(&mut unit);
+            let words = label.words.trim_end_matches(axis).trim().to_owned();
+            let unit = label.unit.clone();
+            group = Label {
+                words,
+                unit,
+                ..Label::default()
+            };
         }
         let times = usize::from(label.increases && run > 1);
-        match run - times {
-            1 if times == 0 && is_axis && !group.is_empty() => {
-                let own = if label.unit.is_empty() {
-                    &unit
-                } else {
-                    &label.unit
-                };
-                named.push((format!("{group} {}", label.words), own.clone()));
+        named.extend(match run - times {
+            1 if times == 0 && is_axis && !group.words.is_empty() => {
+                vec![label.called(format!("{} {}", group.words, label.words), &group)]
             }
             3 if label.axis.is_none() && !label.words.is_empty() => {
-                let time = labels[k..k + times].iter();
-                named.extend(time.map(|of| (String::new(), of.unit.clone())));
-                let axes = labels[k + times..k + run].iter().zip(['x', 'y', 'z']);
-                named.extend(axes.map(|(of, axis)| {
-                    let own = if of.unit.is_empty() {
-                        &label.unit
-                    } else {
-                        &of.unit
-                    };
-                    (format!("{} {axis}", label.words), own.clone())
-                }));
-                k += run - 1;
+                let axes = values[times..].iter().zip(['x', 'y', 'z']);
+                let axes =
+                    axes.map(|(of, axis)| of.called(format!("{} {axis}", label.words), label));
+                let time = values[..times]
+                    .iter()
+                    .map(|of| of.called(String::new(), of));
+                time.chain(axes).collect()
             }
-            _ if run == 1 => named.push((label.words.clone(), label.unit.clone())),
+            _ if run == 1 => vec![label.called(label.words.clone(), label)],
             // The words of a longer row name the row.
-            _ => {
-                named.extend(
-                    labels[k..k + run]
-                        .iter()
-                        .map(|of| (String::new(), of.unit.clone())),
-                );
-                k += run - 1;
-            }
-        }
-        k += 1;
+            _ => values
+                .iter()
+                .map(|of| of.called(String::new(), of))
+                .collect(),
+        });
     }
+    distinct(named)
+}
+
+impl Label {
+    /// The value by this name, with the unit of another label if it has none.
+    fn called(&self, name: String, other: &Self) -> (String, String) {
+        let own = Some(&self.unit).filter(|unit| !unit.is_empty());
+        (name, own.unwrap_or(&other.unit).clone())
+    }
+}
+
+/// Names of which none is used twice.
+fn distinct(mut named: Vec<(String, String)>) -> Vec<(String, String)> {
     let all = named.clone();
     for (k, (name, _)) in named.iter_mut().enumerate() {
-        if !name.is_empty()
-            && all
-                .iter()
-                .enumerate()
-                .any(|(other, of)| other != k && of.0 == *name)
-        {
+        let mut others = all.iter().enumerate().filter(|(other, _)| *other != k);
+        if !name.is_empty() && others.any(|(_, of)| of.0 == *name) {
             *name = format!("{name} {}", k + 1);
         }
     }

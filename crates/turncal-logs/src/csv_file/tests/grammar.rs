@@ -6,7 +6,7 @@ use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::CsvFile;
+use crate::csv_file::CsvFile;
 use crate::rows::LogRows;
 
 const ROWS: usize = 120;

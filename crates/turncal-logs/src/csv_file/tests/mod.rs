@@ -1,3 +1,5 @@
+mod grammar;
+
 use std::fs;
 
 use super::*;
