@@ -138,11 +138,11 @@ impl Shape {
         let rows = &rows[rows.len() - ROWS.min(rows.len().div_ceil(2))..];
         // A separator is what rows share, and what parts numbers: a note may contain others.
         let mut shapes = BTreeMap::<_, (usize, usize)>::new();
-        let delimiters: BTreeSet<Delimiter> = rows.iter().map(|row| row.delimiter).collect();
-        let delimiters = delimiters
-            .into_iter()
-            .chain([b',', b';', b'\t'].map(Delimiter::Byte));
-        for (delimiter, row) in delimiters.flat_map(|of| rows.iter().map(move |row| (of, row))) {
+        let own = rows.iter().map(|row| row.delimiter);
+        let delimiters = own.chain([b',', b';', b'\t'].map(Delimiter::Byte));
+        let delimiters: BTreeSet<Delimiter> = delimiters.collect();
+        let pairs = delimiters.into_iter();
+        for (delimiter, row) in pairs.flat_map(|of| rows.iter().map(move |row| (of, row))) {
             if let Ok(fields) = delimiter.fields(&row.text) {
                 let (rows, numbers) = shapes.entry((delimiter, fields.len())).or_default();
                 *rows += 1;

@@ -244,3 +244,16 @@ fn rows_with_a_tag_are_streams_and_fields_without_a_value_stay_in_place() {
     assert!(csv.advance().unwrap() && csv.advance().unwrap());
     assert!(csv.is_blank(0) && csv.number(2).unwrap() == 3.0);
 }
+
+#[test]
+fn a_separator_is_what_rows_share_and_not_what_a_note_contains() {
+    let rows_with = |note: &str| {
+        let row = |k: usize| format!("{k},{k}.5,1,{note}\n");
+        let text = (0..9).map(row).collect::<String>();
+        rows("a.csv", format!("t,gx,ax,note\n{text}").as_bytes())
+    };
+    for note in ["separate file; label from the sheet", "a\tb", "x up"] {
+        let read = rows_with(note).unwrap();
+        assert!(read.len() == 9 && read[8].1 == [8.0, 8.5, 1.0], "{note}");
+    }
+}
