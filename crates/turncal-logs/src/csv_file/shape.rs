@@ -413,10 +413,16 @@ fn has_decimal_comma(line: &[u8]) -> bool {
 /// Whether words or signs stand beside numbers in a field, or words between the numbers of a row, or the row begins as
 /// a comment or a sentence of a receiver.
 fn is_labelled(shape: &[u8]) -> bool {
-    let separators = [b';', b'\t', b',', b'|'];
-    let separator = separators.into_iter().find(|byte| shape.contains(byte));
     let is_mark = |byte: &u8| matches!(*byte, MARK | WORD);
     let has_mark = |field: &[u8]| field.iter().any(is_mark);
+    // What parts most numbers.
+    let parted = |by: &u8| {
+        let fields = shape.split(|byte| byte == by);
+        fields.filter(|field| has_mark(field)).count()
+    };
+    let separators = [b'|', b',', b'\t', b';'];
+    let separator = separators.into_iter().filter(|byte| shape.contains(byte));
+    let separator = separator.max_by_key(parted);
     let is_mixed = |field: &[u8]| {
         let field = field.trim_ascii();
         let quoted = field
