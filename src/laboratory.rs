@@ -246,7 +246,7 @@ pub struct Conditions {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Traceability {
-    /// In the words of the laboratory.
+    /// Statement in the laboratory's own words.
     pub statement: String,
     /// Equipment that provides it.
     #[serde(default)]

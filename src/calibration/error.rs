@@ -135,7 +135,7 @@ pub enum ComparisonError {
         /// The axis.
         axis: char,
     },
-    /// Mismatch of `parameters` and `covariance`.
+    /// `parameters` and `covariance` do not match.
     #[error(
         "{name}: covariance needs one row and one column per entry of parameters, and each entry must be a parameter \
          of the misalignment form. Write the calibration again"

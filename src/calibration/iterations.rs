@@ -41,7 +41,8 @@ pub struct Solved {
 /// Iterates from a starting point, with these priors of the initial attitudes.
 ///
 /// # Errors
-/// [`CalibrationError`] if no pass is possible at the start. Without convergence, the result says so.
+/// [`CalibrationError`] if no pass is possible at the start. If the iterations do not converge, the result is marked as
+/// not converged.
 pub fn solve(
     problem: &Problem,
     (start, priors): (&Linearisation, &[AttitudePrior]),

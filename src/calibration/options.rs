@@ -75,7 +75,7 @@ impl Options {
         }
     }
 
-    /// Adds this error term, whatever the data say of it, with a wide σ unless instrument or table state another.
+    /// Adds this error term, whatever the data indicate, with a wide σ unless instrument or table state another.
     pub fn with(mut self, term: ErrorTerm) -> Self {
         self.terms.push(term);
         self

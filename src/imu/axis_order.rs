@@ -29,7 +29,7 @@ impl AxisOrder {
         reversed: [true, false, false],
     };
 
-    /// All 48, the first being the identity.
+    /// All 48 axis orders, the identity first.
     pub fn all() -> impl Iterator<Item = Self> {
         const ORDERS: [[usize; 3]; 6] = [
             [0, 1, 2],

@@ -132,7 +132,8 @@ pub enum Height {
 /// Navigation came too close to a pole.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 #[error(
-    "navigation reached latitude {:.3}°, and East-North-Up has no heading near a pole: stay within ±{:.1}°",
+    "navigation reached latitude {:.3}°, but the heading is undefined near a pole in East-North-Up: stay within \
+     ±{:.1}°",
     latitude / DEGREE,
     LARGEST_LATITUDE / DEGREE
 )]

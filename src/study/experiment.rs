@@ -60,7 +60,7 @@ pub enum Situation {
 }
 
 impl Situation {
-    /// All, in the order of every result.
+    /// All situations, in the order in which results list them.
     pub const ALL: [Self; 3] = [Self::SelfAligned, Self::Aligned, Self::Moving];
 }
 

@@ -60,7 +60,7 @@ pub struct Evaluation {
     pub navigation: Vec<Outlook>,
 }
 
-/// Accuracy of a calibration without a move, in which attitude, velocity and position may change to anything.
+/// Accuracy of a calibration that lacks one move: attitude, velocity and position may change arbitrarily during it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Without {
     /// Time of the move and the dwell after it, s.

@@ -41,8 +41,7 @@ impl Ratio {
     }
 }
 
-/// A statistic of all runs, which are given by their numbers, with its 99 % interval; `None` without
-/// runs.
+/// A statistic of all runs with its 99 % interval; `statistic` receives the run numbers. `None` without runs.
 pub fn bootstrap(runs: usize, statistic: impl Fn(&[usize]) -> f64) -> Option<(f64, (f64, f64))> {
     if runs == 0 {
         return None;
@@ -63,7 +62,7 @@ pub fn bootstrap(runs: usize, statistic: impl Fn(&[usize]) -> f64) -> Option<(f6
     ))
 }
 
-/// The median of some of the values, which are given by their numbers.
+/// The median of the values at these indices.
 pub fn median(of: &[f64], chosen: &[usize]) -> f64 {
     let mut values: Vec<f64> = chosen.iter().map(|&k| of[k]).collect();
     values.sort_by(f64::total_cmp);

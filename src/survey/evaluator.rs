@@ -44,7 +44,7 @@ pub struct InterimCalibration {
     pub verdict: Verdict,
     /// Findings.
     pub findings: Vec<Finding>,
-    /// Whether a specification is given and its σ decide every limit.
+    /// Whether a specification is given and the σ are small enough to decide every limit.
     pub is_met: bool,
     /// σ relative to those of the bound.
     inflation: ParameterVector,

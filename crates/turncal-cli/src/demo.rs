@@ -39,7 +39,7 @@ pub struct Demo {
     /// Directory to write
     #[arg(short, long, value_name = "DIR", default_value = "turncal-demo")]
     output: PathBuf,
-    /// Seed of all random numbers [default: the scenario's]
+    /// Random seed [default: the scenario's]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = seed)]
     seed: Option<u64>,
     #[command(flatten)]

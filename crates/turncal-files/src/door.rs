@@ -144,7 +144,7 @@ impl Opened {
     }
 }
 
-/// Whether a file is a `run.toml` or `campaign.toml`, which names others, and not a log: by its extension.
+/// Whether a file is, by its extension, a `run.toml` or `campaign.toml` (which refer to other files) and not a log.
 pub fn is_toml(path: &Path) -> bool {
     path.extension() == Some(OsStr::new("toml"))
 }

@@ -174,7 +174,7 @@ impl FileError {
     }
 }
 
-/// Such as `1 row` or `3 rows`.
+/// A count with its noun, such as `1 row` or `3 rows`.
 pub fn counted(count: usize, name: &str) -> String {
     let plural = if count == 1 { "" } else { "s" };
     format!("{count} {name}{plural}")

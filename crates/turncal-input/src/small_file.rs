@@ -43,7 +43,7 @@ pub fn text(path: &Path, what: &str, advice: &str) -> Result<String, FileError> 
     text.map_err(|error| FileError::io(path, &format!("read {what}"), &error, advice))
 }
 
-/// Such a file of this JSON format.
+/// Reads a small JSON file and checks that its `format` is this one.
 pub fn json<T: DeserializeOwned>(
     path: &Path,
     what: &str,

@@ -52,7 +52,8 @@ impl DataFile {
         }
     }
 
-    /// The file of this path: one of those in memory, which have a name but no directory, otherwise on disk.
+    /// The file in memory with the name of this path, if there is one (files in memory have no directory); otherwise
+    /// the file on disk.
     pub fn find(path: PathBuf, in_memory: &[Self]) -> Self {
         let found = in_memory
             .iter()

@@ -59,8 +59,8 @@ impl Report<'_> {
             self.name
         ));
         document.lead = vec![format!(
-            "{}. The σ are Cramér–Rao bounds for a recording of this path with the stated noise; no data were \
-             measured.",
+            "{}. The σ are Cramér–Rao bounds for a recording of this path with the stated noise; they are not based on \
+             measured data.",
             self.with
         )];
         document.both(self.groups());
@@ -84,7 +84,7 @@ impl Report<'_> {
             (Some(checks), open, _) => (
                 Word::Undecided,
                 format!(
-                    "σ are too large to decide {open} of {} limits",
+                    "the σ are too large to decide {open} of {} limits",
                     checks.len()
                 ),
             ),

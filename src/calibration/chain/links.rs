@@ -25,7 +25,7 @@ pub struct Chain {
     pub slip: f64,
     /// Sum of squares of the observations within parts that does not depend on states or constants.
     pub squares: f64,
-    /// Logarithm of the determinant of the covariance of the observations within parts.
+    /// Log-determinant of the covariance of the observations within parts.
     pub log_determinant: f64,
 }
 

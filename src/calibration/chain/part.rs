@@ -29,7 +29,7 @@ pub struct Part {
     pub values: DVector<f64>,
     /// Sum of squares of the observations that is independent of `g`.
     pub squares: f64,
-    /// Logarithm of the determinant of the covariance of the observations.
+    /// Log-determinant of the observation covariance.
     pub log_determinant: f64,
     /// Number of scalars that were observed.
     pub count: usize,

@@ -19,8 +19,8 @@ const PULSES: f64 = 2.0;
 /// A scatter smaller than this part of the stated noise is shown as zero.
 const NO_NOISE: f64 = 1e-3;
 
-/// Findings on triads with a scatter at rest that does not agree with the noise that the user insists on. Calibrated
-/// inputs are used, because a wrong prior scale factor is not noise.
+/// Findings on triads with scatter at rest that disagrees with the noise imposed by the user (`NoisePolicy::Stated`).
+/// Calibrated inputs are used, because a wrong prior scale factor is not noise.
 ///
 /// A step lasts a tenth of a second, as in the filter: faster errors average out, and of slower ones only random walk,
 /// bias and vibration of the mount remain. The result does not change the calibration, because it does not distinguish

@@ -112,9 +112,8 @@ impl TermEvidence {
         }
         let (shown_by, group) = (term.shown_by(), group.title());
         let text = format!(
-            "This recording does not show the possible error {name}. σ of {group} are {factor:.2} times as large as \
-             without this term. Add {shown_by}; if it is absent, state [imu.terms] {name} = \
-             {{ sigma = 0 }}."
+            "This recording does not show the possible error {name}. The σ of {group} are {factor:.2} times as large \
+             as without this term. Add {shown_by}; if it is absent, state [imu.terms] {name} = {{ sigma = 0 }}."
         );
         Some(Finding::new(Kind::TermNotShown, text, figures))
     }

@@ -15,7 +15,7 @@ pub const BY_HAND: [Source; 3] = [
     Source::RotationAtRest,
 ];
 
-/// Share of each of [`BY_HAND`] in the errors, for unit σ in SI and radians.
+/// Variance that each of [`BY_HAND`] adds to each error, for unit σ in SI and radians.
 pub type Parts = [DVector<f64>; BY_HAND.len()];
 
 /// Additional noise that makes the errors more likely than the stated noise.

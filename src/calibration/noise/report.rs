@@ -178,7 +178,7 @@ fn noise_learnt(
     let lines: Vec<&String> = lines.iter().map(|(_, line)| line).collect();
     let text = format!(
         "Noise is larger than stated: {} (squared distance {ratio:.0}; limit {limit:.0}). turncal used its own \
-         estimate, and σ include it. To state this estimate for the next recording, copy into run.toml: {}.",
+         estimate, and the σ include it. To state this estimate for the next recording, copy into run.toml: {}.",
         words.join("; "),
         below.join(", ")
     );

@@ -70,7 +70,7 @@ impl Group {
         }
     }
 
-    /// Such as `gyro scale factor K`.
+    /// Title, such as `gyro scale factor K`.
     pub fn title(self) -> String {
         format!("{} {}", self.sensor().name(), self.entry().title)
     }

@@ -19,7 +19,7 @@ pub type ParameterVector = SVector<f64, PARAMETERS>;
 /// A matrix of the parameters of both triads.
 pub type ParameterMatrix = SMatrix<f64, PARAMETERS, PARAMETERS>;
 
-/// Index of a parameter of a triad among the parameters of both.
+/// Index among the parameters of both triads of a parameter of one triad.
 pub fn parameter(sensor: Sensor, of_triad: usize) -> usize {
     match sensor {
         Sensor::Gyro => of_triad,

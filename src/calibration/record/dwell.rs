@@ -69,7 +69,7 @@ pub fn part_of(steps: &[Step], longest: usize) -> usize {
     1 + others.take_while(belongs).count()
 }
 
-/// Maximum number of samples of a part of a dwell with this first step.
+/// Maximum number of samples in a part of a dwell that begins with this step.
 pub fn longest(first: &Step) -> usize {
     STEPS * first.samples.len()
 }

@@ -34,9 +34,9 @@ pub enum TemperatureError {
         sensor: Sensor,
         /// The temperature.
         found: f64,
-        /// Lowest of the range.
+        /// Lower end of the valid range.
         lowest: f64,
-        /// Highest of the range.
+        /// Upper end of the valid range.
         highest: f64,
     },
     /// A coefficient of an unknown parameter, or of an invalid order.

@@ -249,7 +249,7 @@ fn not_turned(model: &Model) -> impl Iterator<Item = Finding> {
         of.filter_map(|index| parameter_name(model.form, index))
             .collect()
     };
-    let by = "an instrument at rest in one attitude";
+    let by = "a recording at rest in one attitude";
     let hidden = names(&|sensor, is_bias| !is_bias || sensor == Sensor::Accel);
     let turned = names(&|_, is_bias| !is_bias);
     let findings = [not_observed(by, hidden), temperature_not_seen(turned)];
@@ -258,7 +258,7 @@ fn not_turned(model: &Model) -> impl Iterator<Item = Finding> {
 
 impl AtRest {
     /// The estimate with both triads, and its temperature dependence: biases of the gyros to within Earth rate, all
-    /// others from the prior, because the input hides them.
+    /// others from the prior, because they cannot be separated from the input.
     pub fn biases(&self, problem: &Problem) -> (Estimate, Thermal) {
         let model = &problem.model;
         let variances = model.prior_sigma.map(|sigma| sigma.powi(2));

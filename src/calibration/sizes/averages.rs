@@ -35,7 +35,7 @@ const SETTLED: f64 = 1e-5;
 /// The average over all cases of groups of constants, in units of their usual sizes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Average {
-    /// Inverse of the covariance of the normal prior of each group, block by block.
+    /// Inverse covariance of each group's normal prior, block by block.
     pub precision: DMatrix<f64>,
     /// Covariance between the cases of each group, from both sides multiplied by the inverse of that within them.
     pub between: DMatrix<f64>,

@@ -149,7 +149,7 @@ impl Here<'_> {
         self.filtered.smoothed(&self.posterior)
     }
 
-    /// 1σ of the logarithm of the size of each effect.
+    /// 1σ of the log size of each effect.
     pub fn sigma(&self, usual: &[Usual]) -> DVector<f64> {
         let by_effect = self.smoothed().by_effect();
         DVector::from_iterator(

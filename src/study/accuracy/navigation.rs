@@ -86,7 +86,7 @@ pub struct Way {
 }
 
 impl Journey {
-    /// All, in the order of every result.
+    /// All journeys, in the order in which results list them.
     pub const ALL: [Self; 2] = [Self::Standing, Self::Flight];
 
     fn mission(self, scenario: &Scenario) -> Result<Mission, ModelError> {
@@ -173,7 +173,7 @@ fn whitened(error: &Vector2<f64>, covariance: &Matrix2<f64>) -> Option<Vector2<f
 }
 
 impl Region {
-    /// All, in the order of every result.
+    /// All regions, in the order in which results list them.
     pub const ALL: [Self; 4] = [
         Self::East,
         Self::North,

@@ -10,8 +10,8 @@ pub(super) type ByParameter = SMatrix<f64, 2, PARAMETERS>;
 
 /// Budget of the final position error from the stated covariance, averaged over all instruments.
 ///
-/// Errors of groups are correlated: the filter knows many sums better than their terms. A group's
-/// share is the covariance of its contribution with the total, over the variance of the total,
+/// Errors of groups are correlated: the filter determines many sums better than their terms. A group's share is the
+/// covariance of its contribution with the total, over the variance of the total,
 ///
 /// ```text
 /// share_g = tr(S_g P_g· Sᵀ) / tr(S P Sᵀ)

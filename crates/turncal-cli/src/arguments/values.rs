@@ -55,7 +55,7 @@ pub fn hours(text: &str) -> Result<f64, String> {
         .ok_or_else(|| "expected a number of hours from 0.0167 (one minute) to 1000".to_owned())
 }
 
-/// Seed of all random numbers.
+/// Random seed.
 pub fn seed(text: &str) -> Result<u64, String> {
     text.parse()
         .map_err(|_| format!("expected a whole number from 0 to {}", u64::MAX))

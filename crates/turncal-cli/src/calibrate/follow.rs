@@ -68,7 +68,7 @@ impl Follow<'_> {
                 let begun = Instant::now();
                 known = rows.received.bytes;
                 if followed.evaluate(known, &mut screen)? {
-                    break "the calibration decides every limit";
+                    break "the calibration is accurate enough to decide every limit";
                 }
                 due = begun + APART.max(begun.elapsed().mul_f64(PAUSE));
             }

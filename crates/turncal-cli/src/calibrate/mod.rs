@@ -110,7 +110,8 @@ pub struct Calibrate {
     /// [default: follow-TIME.csv]
     #[arg(long, value_name = "FILE", requires = "follow", help_heading = FOLLOWING)]
     keep: Option<PathBuf>,
-    /// The run.toml that describes the rows; the file that it names keeps the rows of - or a device, and must be new
+    /// run.toml that describes the rows; rows from standard input (-) or a device are saved in the log file given
+    /// there, which must be new
     #[arg(long, value_name = "RUN.toml", requires = "follow", conflicts_with = "keep", value_parser = run_file, help_heading = FOLLOWING)]
     run: Option<PathBuf>,
     /// Time without growth after which a followed file is complete, s

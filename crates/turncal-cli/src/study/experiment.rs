@@ -18,8 +18,8 @@ const SCENARIO: &str = "experiment";
 /// Simulates the turntable experiment of the paper: navigation accuracy after each calibration
 ///
 /// Simulates many instruments on a table with position errors, with noise and Gauss–Markov biases. Calibrates each with
-/// the closed form on the static positions of the paper and with the filter (in a sixth of that time and in the same
-/// time), in all misalignment forms. Navigates with the remaining errors: at rest, with self-alignment or perfect
+/// the closed form on the paper's static positions, and with the filter in a sixth of that table time and in the same
+/// table time, in all misalignment forms. Navigates with the remaining errors: at rest, with self-alignment or perfect
 /// alignment, and moving. Shows the position error of every method, and the parameters that cause it.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:

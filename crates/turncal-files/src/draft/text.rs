@@ -141,7 +141,7 @@ impl Draft {
         let (path, clock) = ("imu.sample_period_s", &self.clock);
         let Some(period) = clock.period else {
             if !self.rows_show_period() {
-                let why = "seconds between rows, which a counter does not give";
+                let why = "seconds between rows; a counter does not give them";
                 remarks.open(path, why);
             }
             return None;

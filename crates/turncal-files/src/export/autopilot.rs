@@ -1,4 +1,4 @@
-//! Parameters of PX4, ArduPilot, Betaflight and INAV: offsets, and scales of accelerometers.
+//! Parameters for PX4, ArduPilot, Betaflight and INAV: offsets, and accelerometer scales.
 //!
 //! PX4 and ArduPilot compute `(n − offset) ⊙ scale` for accelerometers and `n − offset` for gyros, in sensor axes, and
 //! then rotate to body axes (`SENS_BOARD_ROT`, `AHRS_ORIENTATION`). INAV and Betaflight do the same in whole counts.

@@ -32,7 +32,7 @@ pub struct Samples<'a> {
     pub correction: &'a Correction,
     /// Whether missing samples are also written, interpolated, with 1 in a column `filled`.
     pub fill: bool,
-    /// Verdict of the calibration, which names a last column.
+    /// Verdict of the calibration, used as the name of a last column.
     pub verdict: Option<Word>,
 }
 

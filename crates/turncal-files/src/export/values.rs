@@ -23,7 +23,7 @@ pub enum Axes {
 /// Every value of a calibration and, perhaps, a run of its instrument.
 pub struct Values<'a> {
     pub record: &'a Calibration,
-    /// In the unit of the record, along right, front, up.
+    /// Correction in the unit of the record, along right, front, up.
     pub correction: Correction,
     /// From the axes of the format to right, front, up.
     pub order: AxisOrder,

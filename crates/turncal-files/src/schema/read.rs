@@ -202,8 +202,8 @@ impl InstrumentFields<'_> {
         let sigma = self.known.prior.gyro.scale_sigma.norm() / 3.0;
         let percent = 100.0 * sigma;
         notes.push(format!(
-            "The log has no time column, and its rate is not stated. turncal estimated a sample period of {period:.4} s \
-             ± {percent:.1} % from the turns, which widens the σ of the gyro scale factors by the same amount. State \
+            "The log has no time column, and its rate is not stated. turncal estimated a sample period of {period:.4} \
+             s ± {percent:.1} % from the turns; this uncertainty is included in the σ of the gyro scale factors. State \
              sample_period_s (--rate)."
         ));
         Ok(imu.with_period(period, sigma))

@@ -23,8 +23,8 @@ impl Broken {
     }
 }
 
-/// Maximum number of bytes unpacked at once from a log of this length (a chunk, a row of an array). Real chunks have a
-/// few megabytes; larger claims are damage or decompression bombs.
+/// Maximum number of bytes unpacked at once from a log of this length (a chunk, a row of an array). Real chunks are a
+/// few megabytes long; larger stated sizes indicate damage or a decompression bomb.
 pub fn most_at_once(length: u64) -> u64 {
     length.max(1 << 27)
 }

@@ -52,7 +52,7 @@ pub fn bound(accuracy: &Accuracy) -> Table {
     let cells = |of: &Compared| against_bound(of.figures, of.unit_value);
     Table::new("EKF against the Cramér–Rao bound", columns(AGAINST_BOUND))
         .sections(sections(accuracy, cells))
-        .note("RMS over all runs and the parameters of a group; σ: stated by the filter.")
+        .note("RMS over all runs and all parameters of a group; σ: as computed by the filter.")
         .note("Position: horizontal, after 40 h from perfect alignment; flight: on the trajectory flight.")
         .note("Bound: Bayesian Cramér–Rao bound from a pass linearised at the truth. Interval: bootstrap over runs.")
 }
@@ -124,7 +124,7 @@ pub fn consistency(accuracy: &Accuracy) -> Table {
         .section(nees.into_iter().chain(nis))
         .note("NEES/n: squared errors normalised by the stated covariance; NIS: squared innovations normalised by \
             theirs.")
-        .note("Both are 1 if σ are correct; intervals from χ².")
+        .note("Both are 1 if the σ are correct; intervals from χ².")
 }
 
 fn nis_row(name: &str, nis: &Nis) -> Vec<String> {

@@ -135,8 +135,8 @@ fn nees(accuracy: &Accuracy) -> (bool, String) {
              correlations."
         ),
         (Ordering::Equal, _) => format!(
-            "ANEES {mean} is outside its 95 % interval {inner}, which happens in one study of twenty, but within its \
-             99.8 % interval {outer}."
+            "ANEES {mean} is outside its 95 % interval {inner}, as happens in one study in twenty, but within its 99.8 \
+             % interval {outer}."
         ),
         (_, side) => format!(
             "ANEES {mean} is {side} its 99.8 % interval {outer}: the stated σ are too {} (errors are {} times σ).",

@@ -102,7 +102,7 @@ pub fn table_time(experiment: &Experiment, estimator: Estimator) -> Option<f64> 
     timed.find_map(|(method, time)| (method.estimator == estimator).then_some(*time))
 }
 
-/// Such as `EKF 10 min, six-angle`.
+/// Name of a method, such as `EKF 10 min, six-angle`.
 pub fn method_name(experiment: &Experiment, method: Method) -> String {
     let estimator = estimator_name(experiment, method.estimator);
     format!("{estimator}, {}", method.form.name())

@@ -6,7 +6,7 @@ use turncal::calibration::{AuxiliaryKind, Word};
 use turncal::imu::{AXES, InstallationForm, Sensor};
 use turncal::lot::{Lot, Quantity, Sample, Spread, Verdict};
 
-/// Such as `gyro K x` or `gyro noise x`.
+/// Title of a quantity, such as `gyro K x` or `gyro noise x`.
 pub fn title(quantity: Quantity) -> String {
     match quantity {
         Quantity::Parameter(index) => short_name(InstallationForm::General, index),

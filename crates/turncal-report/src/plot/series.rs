@@ -50,11 +50,11 @@ pub enum Mark {
 /// Position of a text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Anchor {
-    /// In the middle above its point.
+    /// Centred above its point.
     Above,
-    /// In the middle below it.
+    /// Centred below its point.
     Below,
-    /// In the middle of it.
+    /// Centred on its point.
     Middle,
 }
 

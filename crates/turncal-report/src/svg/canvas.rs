@@ -2,7 +2,7 @@
 //! with their hover texts.
 //!
 //! Plotters rounds every coordinate to a whole pixel, so a mark is drawn [`FINE`] times larger and shown at its size.
-//! Sizes here are in shown pixels.
+//! Sizes here are in displayed pixels.
 
 use maud::{PreEscaped, html};
 use plotters::element::{DashedPathElement, Drawable, PointCollection};

@@ -66,7 +66,7 @@ impl Names {
     }
 }
 
-/// Lines of the title of a panel of this width.
+/// Title lines for a panel of this width.
 pub fn title(panel: &Panel, room: f64) -> Vec<String> {
     if width(&panel.title, 1.0) <= room {
         return vec![panel.title.clone()];

@@ -70,7 +70,7 @@ kinds! {
     Unexplained = "W03" "unexplained" Failed:
         "The residuals are too large for any noise figure, so the values are meaningless. The usual causes are labels \
          or table attitudes from a different recording, a wrong axis order, a wrong unit, or a mount that slipped. \
-         Look first at the interval with the largest residuals, which the finding names."
+         Look first at the interval with the largest residuals, given in the finding."
         "The residuals of the evaluation are unexplained; the results must not be used."
     NotObserved = "W04" "not-observed" Partial:
         "The recording adds little information about these parameters: σ is still more than half of the prior, so \
@@ -111,7 +111,7 @@ kinds! {
         "The results apply together with the error terms listed in this certificate."
     Settling = "W15" "settling" Note:
         "After stops, the attitude differs from the reading of the table by an angle that fades within seconds. \
-         turncal estimated the usual size of this angle, and σ include it. Wait longer after each stop, or state \
+         turncal estimated the usual size of this angle, and the σ include it. Wait longer after each stop, or state \
          settling_sigma_arcsec in [turntable]."
         "The turntable settled for some seconds after its moves; U includes the effect."
     PositionWrong = "W16" "position-wrong" Care:
@@ -142,8 +142,8 @@ kinds! {
          by more than their σ. Rerun with --installation general."
         "The instrument has misalignments that the chosen model does not contain; U does not include them."
     Rounded = "W22" "rounded" Care:
-        "The log rounds values more coarsely than their noise, so averaging cannot recover the mean within a step. σ \
-         include this error. Log more digits or raw counts."
+        "The log rounds values more coarsely than their noise, so averaging cannot recover the mean within a step. The \
+         σ include this error. Log more digits or raw counts."
         "The output of the instrument is rounded to steps larger than its noise; U includes the effect."
     EvenTermsInseparable = "W24" "even-terms-inseparable" Care:
         "When an axis points up or down, the second-order term and the asymmetry of its accelerometer have the same \
@@ -161,7 +161,7 @@ kinds! {
          from the inertial sensors."
         "The instrument changed between the recordings of the calibration; U includes the difference."
     LabelsContradicted = "W27" "labels-contradicted" Care:
-        "The labels of some sections contradict gravity or the gyros. The finding names these sections and says \
+        "The labels of some sections contradict gravity or the gyros. The finding lists these sections and states \
          whether turncal used them. Correct the labels in the [segments] file."
         "The labels of some positions contradicted the data and were not used as stated."
     SectionsLost = "W28" "sections-lost" Care:
@@ -170,14 +170,14 @@ kinds! {
         "Some positions were not used, because data were missing."
     ResidualsLarge = "W29" "residuals-large" Care:
         "The closed form leaves residuals that stated noise and table errors do not explain. turncal widened all σ by \
-         √(χ²/ν), the Birge ratio. The finding names the interval with the largest residual: look there for a bump, a \
+         √(χ²/ν), the Birge ratio. The finding gives the interval with the largest residual: look there for a bump, a \
          wrong label or a wrong attitude. Otherwise check the noise figures, drifts of bias or scale factors, and the \
          level and north of the table."
         "The residuals exceed those expected; U was widened in proportion."
     StatementDoubted = "W30" "statement-doubted" Care:
         "run.toml contradicts the log: for example, gravity is far from normal gravity at the site, a column is \
          constant or named twice, or the table log has a different time or clock. Each of these can change the result \
-         by more than its σ. Correct the field or log that the finding names."
+         by more than its σ. Correct the field or log given in the finding."
         "Some statements about the record contradict its data."
     PriorContradicted = "W31" "prior-contradicted" Failed:
         "A scale factor differs from the stated one by more than 10 prior σ and more than 10 %, or by more than 41 \
@@ -195,8 +195,8 @@ kinds! {
         "The instrument slipped on the turntable; the misalignments apply to the mounting before the slip."
     TermNotShown = "W34" "term-not-shown" Note:
         "This recording cannot show an error term that instruments of this class may have, and K, E or D depend on the \
-         term. σ include its usual size. Add the moves that the finding names, or state that the instrument does not \
-         have the term: sigma = 0 in [imu.terms]. `--with none` leaves out all terms."
+         term. The σ include its usual size. Add the moves listed in the finding, or state that the instrument does \
+         not have the term: sigma = 0 in [imu.terms]. `--with none` leaves out all terms."
         "U includes the usual size of error terms that the record does not show."
 }
 

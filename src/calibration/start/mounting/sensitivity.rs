@@ -30,7 +30,7 @@ pub struct Sensitivity {
 pub enum Axes {
     /// All three.
     All,
-    /// The one with this number.
+    /// The axis with this number.
     One(usize),
 }
 

@@ -191,7 +191,8 @@ fn begin(parent: &Path) -> io::Result<(PathBuf, Option<File>)> {
     Ok((stage, lock))
 }
 
-/// Removes stages of processes that no longer exist from a directory, except empty ones, which may be about to be locked.
+/// Removes from a directory the stages of processes that no longer exist, except empty stages: these may be about to be
+/// locked.
 pub fn remove_abandoned(parent: &Path) {
     for entry in fs::read_dir(parent).into_iter().flatten().flatten() {
         let (stage, name) = (entry.path(), entry.file_name());

@@ -5,7 +5,7 @@ use crate::prelude::*;
 use turncal::calibration::Group;
 use turncal::imu::{Sensor, Term};
 
-/// A value and its U as EA-4/02, 6.3 wants them: U to two digits, the value to the same place.
+/// A value and its U rounded as required by EA-4/02, 6.3: U to two digits, the value to the same place.
 pub fn two_digits(of: f64, expanded: f64) -> (f64, f64) {
     let place = 10f64.powf((expanded.log10() - 1.0).floor());
     if place > 1.0 {
