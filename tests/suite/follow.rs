@@ -131,7 +131,7 @@ fn a_run_toml_describes_rows_and_names_the_file_that_keeps_them() {
     let (output, _) = follow("other.csv");
     let told = text(&output);
     assert!(
-        !output.status.success() && told.contains("run.toml: [imu] names rows.csv"),
+        !output.status.success() && told.contains("run.toml: [imu] gives the log rows.csv"),
         "{told}"
     );
 }

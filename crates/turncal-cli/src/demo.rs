@@ -61,7 +61,7 @@ impl Demo {
         let problem = Problem::new(&turning.run, &Options::default());
         let solution = solve(&problem, Method::Ekf, &activity)?;
         if !solution.converged() {
-            bail!("the demonstration did not converge; take another --seed");
+            bail!("the demonstration did not converge; choose another --seed");
         }
         let assessment = solution.assess(&problem)?;
         activity.next("navigating");

@@ -68,7 +68,7 @@ impl Opened {
         show: impl FnOnce(&Draft),
     ) -> Result<Self, FileError> {
         let Some(file) = files.first() else {
-            let advice = "Give a log, or a run.toml with the files that it names.";
+            let advice = "Give a log, or a run.toml with the files it refers to.";
             return Err(FileError::of(Path::new(""), "no file", "a log", advice));
         };
         Self::of_file(file, files, (stream, stated), show)

@@ -264,7 +264,7 @@ fn table(all: &[NotShown]) -> Table {
     .section(all.iter().map(row))
     .note(
         "Combinations of parameters, and error terms that are not estimated, that keep more than half of their prior \
-         σ. Could change: RMS over the group that a term of usual size changes most, in σ of the group.",
+         σ. Could change: RMS change, in σ, of the group most affected by a term of usual size.",
     )
 }
 

@@ -49,9 +49,9 @@ impl Residuals {
         let (limit, growth) = (self.limit(), self.growth());
         let text = format!(
             "The static fit of {of} is poor (χ² {chi_square:.0} with {degrees} degrees of freedom; limit {limit:.0}). \
-             turncal widened σ {}. The worst interval is {begin:.1}–{end:.1} s. Look there for a bump, a wrong label or \
-             a wrong attitude; otherwise check the noise figures in [imu.noise], the level and north of the table in \
-             [turntable], and whether the sensor was really still.",
+             turncal widened the σ {}. The worst interval is {begin:.1}–{end:.1} s. Look there for a bump, a wrong \
+             label or a wrong attitude; otherwise check the noise figures in [imu.noise], the level and north of the \
+             table in [turntable], and whether the sensor was really still.",
             widened_by(growth)
         );
         let figures = json!({

@@ -52,8 +52,8 @@ pub fn rounded(
         };
         let step = steps.fold(0.0, f64::max) / value;
         let text = format!(
-            "{} values are rounded to {step:.2e} {unit}, coarser than their noise, so averaging cannot recover \
-             where within a step they are. turncal widened σ {}. Log more digits.",
+            "{} values are rounded to {step:.2e} {unit}, coarser than their noise, so averaging cannot recover their \
+             position within a step. turncal widened the σ {}. Log more digits.",
             triad_name(sensor),
             widened_by(growth)
         );

@@ -50,8 +50,8 @@ pub fn absurd(problem: &Problem, outcome: &Outcome) -> Option<Finding> {
     let (name, middle) = worst.max_by(|one, other| one.1.total_cmp(&other.1))?;
     let percent = format!("{} %", three_digits(100.0 * middle));
     let text = format!(
-        "Calibration rejected: in the median dwell {}, more than any sensor is wrong after calibration. Do not use the \
-         values or σ. Check units, axes and rate in run.toml with turncal check.",
+        "Calibration rejected: in the median dwell {}, more than the error of any sensor after calibration. Do not use \
+         the values or σ. Check units, axes and rate in run.toml with turncal check.",
         name.replace("{}", &percent)
     );
     let figures = json!({ "median": middle, "limit": ABSURD });

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum NoisePolicy {
-    /// Use the noise that run.toml and models state
+    /// Use the noise stated in run.toml and models
     Stated,
     /// Estimate the noise from the recording, with the stated noise as prior
     #[default]

@@ -33,8 +33,8 @@ pub const FORMAT_WITH_TEMPERATURE: &str = "turncal-calibration/2";
 pub const EQUATION: &str = "N = scale * (installation * u) + bias; u = correction * (N - bias)";
 
 /// The equation of a record with error terms of the instrument.
-pub const EQUATION_WITH_TERMS: &str = "N = scale * (installation * (u + t)) + bias; u = correction * (N - bias) - t; t: what terms add \
-     to u, zero in test_vectors";
+pub const EQUATION_WITH_TERMS: &str = "N = scale * (installation * (u + t)) + bias; u = correction * (N - bias) - t; \
+                                       t: contribution of the error terms to u, zero in test_vectors";
 
 /// A calibration with its accuracy and origin, or a known truth.
 ///

@@ -54,7 +54,7 @@ impl ImuSamples {
             0 => "turncal interpolated the samples in between, and the σ include the interpolation error."
                 .to_owned(),
             unbridged => format!(
-                "turncal interpolated the samples between, but attitude and velocity restart at {unbridged} of {} \
+                "turncal interpolated the samples in between, but attitude and velocity restart at {unbridged} of {} \
                  places, so dwells and moves are lost. Split the log where its rate changes, and calibrate the parts \
                  together as a campaign.",
                 part.places

@@ -92,7 +92,7 @@ mod tests {
         assert!(
             said[0].starts_with(
                 "From line 2001 (20.01 s) to 39.98 s the row interval is 30.000 ms instead of 10.000 ms: turncal \
-                 interpolated the samples between, but attitude and velocity restart at 499 of 666 places"
+                 interpolated the samples in between, but attitude and velocity restart at 499 of 666 places"
             ),
             "{said:?}"
         );

@@ -78,7 +78,7 @@ pub const AIDINGS: [Choice<Aiding>; 2] = [
 pub const NOISE: [Choice<NoisePolicy>; 4] = [
     (
         "stated",
-        "Use the noise that run.toml and models state",
+        "Use the noise stated in run.toml and models",
         NoisePolicy::Stated,
     ),
     (

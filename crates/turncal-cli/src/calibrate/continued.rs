@@ -43,7 +43,7 @@ impl Continued {
         let kind = last.filter(|_| !head.contains(&0)).and_then(RowKind::of);
         let Some(kind) = kind else {
             bail!(
-                "found no rows of numbers at the end of the file, expected rows to continue. Name another file"
+                "found no rows of numbers at the end of the file, expected rows to continue. Choose another file"
             );
         };
         Ok(Some(Self {
@@ -65,7 +65,7 @@ impl Continued {
             lines.partition(|line| self.kind.check(line).is_ok());
         if let (true, Some(why)) = (rows.is_empty(), others.last()) {
             let why = self.kind.check(why).err().unwrap_or_default();
-            bail!("{log}: {why} as in this file. Name another file for these rows");
+            bail!("{log}: {why} as in this file. Choose another file for these rows");
         }
         let is_names = |line: &&Vec<u8>| self.kind.is_names(line);
         let own = self.head.iter().find(is_names);
@@ -75,12 +75,12 @@ impl Continued {
         {
             let [own, new] = [own, new].map(|names| String::from_utf8_lossy(names.trim_ascii()));
             bail!(
-                "{log}: found the columns {new}, expected {own} as in this file. Name another file"
+                "{log}: found the columns {new}, expected {own} as in this file. Choose another file"
             );
         }
         if rows.len() > 1 && rows.iter().all(|row| self.head.contains(row)) {
             bail!(
-                "{log}: found rows that this file contains already, expected new ones. Name another file"
+                "{log}: found rows that this file contains already, expected new rows. Choose another file"
             );
         }
         Ok(())

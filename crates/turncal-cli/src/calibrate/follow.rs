@@ -97,8 +97,8 @@ impl Follow<'_> {
             && log.metadata().is_ok_and(|of| of.len() > 0)
         {
             bail!(
-                "{}: found that [imu] names {}, which exists, expected a new file to keep the rows in. Name a new file \
-                 there, or follow that file",
+                "{}: found the existing file {} in [imu], expected a new file for the rows. Give a new file there, or \
+                 follow the existing file",
                 run.display(),
                 log.display()
             );
@@ -117,7 +117,7 @@ impl Follow<'_> {
             Ok(())
         } else {
             bail!(
-                "{}: [imu] names {}, but --follow {}. Follow the file named in run.toml",
+                "{}: [imu] gives the log {}, but --follow gives {}. Follow the log given in run.toml",
                 run.display(),
                 named.display(),
                 self.source.display()

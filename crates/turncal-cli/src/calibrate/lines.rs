@@ -163,7 +163,7 @@ impl Lines {
             let wrong = match kind.check(&line) {
                 _ if is_remark(&line) || is_above && kind.is_names(&line) => None,
                 _ if is_cut && k == 0 => Some(CUT.to_owned()),
-                Ok(()) => is_above.then(|| "a row above the names of columns".to_owned()),
+                Ok(()) => is_above.then(|| "a row above the column names".to_owned()),
                 Err(why) => (!is_above || self.begin_anywhere).then_some(why),
             };
             match wrong {

@@ -122,7 +122,7 @@ fn only_output(directory: &Path) -> Result<(), FileError> {
         .map_err(|error| unwritable(directory, "list the directory", &error))?;
     foreign.map_or(Ok(()), |foreign| {
         let (name, list) = (foreign.display(), manifest::FILE);
-        let found = format!("`{name}` in it, which turncal's list of its own files (`{list}`) does not name");
+        let found = format!("`{name}` in it, which is not in turncal's list of its own files (`{list}`)");
         let expected = "a directory with only files that turncal wrote";
         let advice = "Move this file elsewhere or choose another name, because replacing the directory would delete \
             the file.";

@@ -281,7 +281,7 @@ impl Draft {
     fn without_time(&self, remarks: &mut Remarks) {
         let (path, why) = ("imu.columns", &self.clock.why);
         let instead = if self.clock.is_stated {
-            "rows are taken as consecutive."
+            "turncal takes the rows as consecutive."
         } else if self.rows_show_period() {
             "the sample period is estimated from the turns unless sample_period_s is set."
         } else {

@@ -144,7 +144,7 @@ impl Quantities {
         self.output = output;
         self.output_why = match output {
             Output::Pulse => {
-                "integer counts that carry their remainder, as pulse outputs do".into()
+                "integer counts whose remainder is carried into the next row, as in pulse outputs".into()
             }
             Output::Increment => {
                 let period = rounded(rows.period, 4);

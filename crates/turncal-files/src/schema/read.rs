@@ -193,7 +193,7 @@ impl InstrumentFields<'_> {
         let Some(period) = angle.filter(|&period| period > 0.0) else {
             return Err(FileError::of(
                 &self.log.source.file,
-                "rows without time stamps, with turns too poor to estimate the sample period",
+                "rows without time stamps, and turns that are not good enough to estimate the sample period",
                 "a time column or sample_period_s in run.toml",
                 "Add sample_period_s to [imu].",
             ));
@@ -233,8 +233,8 @@ impl InstrumentFields<'_> {
         };
         Some(format!(
             "The time stamps are {period} s apart, {ppm:.2} ppm {way} than sample_period_s. turncal used the time \
-             stamps, which changes the scale factor of the {triad} by the same amount, {judged} \
-             its prior σ of {sigma:.2} ppm.{advice}"
+             stamps; this changes the scale factor of the {triad} by the same amount, {judged} its prior σ of \
+             {sigma:.2} ppm.{advice}"
         ))
     }
 }
@@ -291,9 +291,9 @@ fn place_note(site: &Site, has_gravity: bool, has_height: bool) -> Option<String
         (true, true) => return None,
     };
     let of_rate =
-        "estimated Earth rate as an unknown vector, which widens the σ of the gyro biases";
+        "estimated Earth rate as an unknown vector (larger σ of the gyro biases)";
     let of_gravity = format!(
-        "assumed a gravity of {:.4} ± {:.4} m/s², which widens the σ of the accelerometer scale factors",
+        "assumed a gravity of {:.4} ± {:.4} m/s² (larger σ of the accelerometer scale factors)",
         site.gravity, site.gravity_sigma
     );
     let costs = match (site.is_known, has_gravity) {

@@ -403,8 +403,8 @@ impl Stamps {
         let (same, line) = self.at_once;
         notes.extend((same > 0).then(|| {
             format!(
-                "{file}: {} with the time of the row before but other values, the first in line {line}. Each counts \
-                 as a sample.",
+                "{file}: {} with the same time as the previous row but other values, the first in line {line}. Each \
+                 counts as a sample.",
                 counted(same, "row")
             )
         }));

@@ -68,7 +68,7 @@ pub fn auxiliary(accuracy: &Accuracy) -> Table {
         columns(AGAINST_BOUND),
     )
     .section(accuracy.error_terms.iter().map(row))
-    .note("RMS over all runs and the parameters of a term.")
+    .note("RMS over all runs and all parameters of a term.")
 }
 
 pub fn gain(accuracy: &Accuracy) -> Table {
@@ -123,7 +123,7 @@ pub fn consistency(accuracy: &Accuracy) -> Table {
 ))
         .section(nees.into_iter().chain(nis))
         .note("NEES/n: squared errors normalised by the stated covariance; NIS: squared innovations normalised by \
-            theirs.")
+               their predicted covariance.")
         .note("Both are 1 if the σ are correct; intervals from χ².")
 }
 

@@ -101,7 +101,7 @@ fn against_bound(accuracy: &Accuracy) -> (bool, String) {
     if !form.holds(truth) {
         let text = format!(
             "The {} form cannot represent the truth, which is {}. Relative to the bound of the general form, the \
-             errors are larger by a factor of: {}.",
+             errors are larger by these factors: {}.",
             form.name(),
             truth.name(),
             named(accuracy, of, |_| true)

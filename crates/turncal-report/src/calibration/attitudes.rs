@@ -46,8 +46,8 @@ impl Report<'_> {
         let far = FAR / DEGREE;
         let caption = format!(
             "Dots: upward direction along the body axes in each dwell, in an equal-area map of the two hemispheres. \
-             Inner circle: {far:.0}° from the pole. Rings: positions with an axis up or down that are more than {far:.0}° \
-             from every dwell. Missing of the six positions: {missing}."
+             Inner circle: {far:.0}° from the pole. Rings: positions with an axis up or down that are more than \
+             {far:.0}° from every dwell. Missing positions (of the six): {missing}."
         );
         let plot = Plot::new("attitudes.svg", "Attitudes reached", (3, 420), panels);
         (!rests.is_empty()).then(|| plot.caption(caption))

@@ -50,8 +50,8 @@ pub fn table(budget: &Budget, estimate: &Estimate) -> Table {
              calibration.json lists all of them per parameter.",
         )
         .note(
-            "ν: degrees of freedom of each source, infinite if stated. k: from Student's t with the effective \
-             degrees of freedom, largest of the group.",
+            "ν: degrees of freedom of each source, infinite if stated. k: from Student's t with the effective degrees \
+             of freedom; the largest in the group.",
         );
     table.notes.extend(taken_as_exact(budget));
     table

@@ -18,8 +18,8 @@ impl Report<'_> {
         });
         let panels =
             Group::all().filter_map(|group| self.of_group(group, estimate, prior.as_ref()));
-        let mut caption = "Each parameter with an error bar of ±2σ, which is shorter than its dot if the parameter is \
-             well determined; scale factors as deviation from nominal. Bands: prior mean ±1σ."
+        let mut caption = "Each parameter with an error bar of ±2σ (hidden by the dot if the parameter is well \
+                           determined); scale factors as deviation from nominal. Bands: prior mean ±1σ."
             .to_owned();
         if self.specification.is_some() {
             caption += " Dashed: limits of the specification; a prior may extend beyond the axes.";

@@ -164,9 +164,9 @@ fn correlation(estimate: &Estimate) -> Option<Plot> {
     panel.square = true;
     let plot = Plot::new("correlation.svg", "Correlations", (1, 860), [panel]).caption(format!(
         "Correlation of the estimated parameters. Below the diagonal the side of a square grows with the magnitude; \
-         blue squares are positive, orange ones negative. Above the diagonal, a wide figure gives the coefficient in \
-         hundredths if its magnitude is at least {WRITTEN}. This path determines strongly correlated parameters only as a sum or \
-         difference, not individually."
+         blue squares are positive, orange ones negative. If the figure is wide enough, the coefficient is given in \
+         hundredths above the diagonal where its magnitude is at least {WRITTEN}. This path determines strongly \
+         correlated parameters only as a sum or difference, not individually."
     ));
     (!indices.is_empty()).then_some(plot)
 }

@@ -47,9 +47,9 @@ pub fn figure(quality: &Quality) -> Plot {
         panels,
     )
     .caption(
-        "|f| − gravity: deviation of the mean specific force of each dwell from gravity. Direction: angle after each \
-         move between the vertical that the gyros carried over from the dwell before and the vertical that the \
-         accelerometers measure. Crosses: the nominal instrument, without calibration. Dots: the calibrated \
-         instrument. Rings: an instrument calibrated without that dwell.",
+        "|f| − gravity: deviation of the mean specific force of each dwell from gravity. Direction: angle, after each \
+         move, between the vertical carried over from the previous dwell by the gyros and the vertical measured by the \
+         accelerometers. Crosses: the nominal instrument, without calibration. Dots: the calibrated instrument. Rings: \
+         an instrument calibrated without that dwell.",
     )
 }

@@ -76,8 +76,8 @@ pub fn orders(form: InstallationForm, thermal: &Thermal) -> Table {
             rows.filter_map(|i| row(group, i)).collect::<Vec<_>>()
         }))
         .note(format!(
-            "Legendre coefficients ± 1σ over {ranges}: change of the parameter over half the range. Each \
-             order is averaged over being absent and its usual sizes."
+            "Legendre coefficients ± 1σ over {ranges}: change of the parameter over half the range. Each order is \
+             averaged over its absence and its usual sizes."
         ))
 }
 

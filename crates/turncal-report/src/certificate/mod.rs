@@ -28,8 +28,8 @@ pub enum CertificateError {
     },
     /// The earlier calibration must not be used.
     #[error(
-        "the verdict of the earlier calibration, {name}, is FAILED, so it does not show the state as found. Give the last \
-         calibration that is valid, or none."
+        "the verdict of the earlier calibration, {name}, is FAILED, so it does not show the state as found. Give the \
+         last valid calibration, or none."
     )]
     Earlier {
         /// Its name.

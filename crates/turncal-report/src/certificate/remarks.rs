@@ -11,7 +11,7 @@ pub fn sentences(findings: &[Finding]) -> Vec<String> {
         let kind = Kind::named(&finding.kind);
         let sentence = match kind {
             Some(kind) => with_parameters(kind.remark(), finding),
-            None => format!("The evaluation has the finding {}.", finding.code),
+            None => format!("The evaluation has finding {}.", finding.code),
         };
         if !all.contains(&sentence) {
             all.push(sentence);

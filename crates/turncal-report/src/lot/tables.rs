@@ -267,8 +267,8 @@ fn notes(lot: &Lot, mut table: Table) -> Table {
     }
     if let Some(gravity) = lot.shared_gravity.filter(|_| lot.rows.len() > 1) {
         table = table.note(format!(
-            "The error of gravity, the same for all (1σ {} ppm), is part of every σ of accelerometer K and of their \
-             mean, but not of scatter and differences between calibrations.",
+            "The gravity error, the same for all calibrations (1σ {} ppm), is part of every σ of accelerometer K and \
+             of the σ of their mean, but not of the scatter or of differences between calibrations.",
             sigma(gravity / PPM)
         ));
     }

@@ -223,8 +223,8 @@ mod tests {
             "0.000000055",
             "Gyros, six-angle form (Eq. 8): not reproducible by a correct program, which gives zero",
             "a slip reproduces the figures in the paper: E_zy of the wrong sign",
-            "Gyros, three-angle form (Eq. 10): not reproduced as stated, but under another reading: angles \
-             ±0.2°, 48 h. With angles ±0.2° all agree but position",
+            "Gyros, three-angle form (Eq. 10): not reproduced as stated, but under another reading: angles ±0.2°, 48 \
+             h. With angles ±0.2° all agree except position",
             "Accelerometers, six-angle form (Eq. 8): zero except for rounding",
             "Accelerometers, three-angle form (Eq. 10): reproduced as stated",
         ] {

@@ -30,7 +30,7 @@ fn of_reading(row: &Row) -> String {
     match (agree.len(), apart.len()) {
         (_, 0) => "all agree".to_owned(),
         (0, _) => "none agrees".to_owned(),
-        (more, few) if few < more => format!("all agree but {}", apart.join(", ")),
+        (more, few) if few < more => format!("all agree except {}", apart.join(", ")),
         _ => format!("only {} agree", agree.join(", ")),
     }
 }

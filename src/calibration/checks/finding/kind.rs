@@ -63,7 +63,7 @@ kinds! {
          If the text names a field, state it in run.toml. `turncal check` lists all faults of a log."
         "The record was repaired, or completed by assumptions, before the evaluation; U includes the effect."
     NotConverged = "W02" "not-converged" Failed:
-        "A parameter was still changing when the iterations ended, so neither the values nor σ can be used. The \
+        "A parameter was still changing when the iterations ended, so neither the values nor the σ can be used. The \
          usual causes are a wrong scale, unit, sample period or axis in run.toml, or a recording with almost no \
          motion. Run `turncal check`, which compares scale, unit and axes with gravity and the turns."
         "The evaluation did not converge; the results must not be used."
@@ -73,9 +73,9 @@ kinds! {
          Look first at the interval with the largest residuals, given in the finding."
         "The residuals of the evaluation are unexplained; the results must not be used."
     NotObserved = "W04" "not-observed" Partial:
-        "The recording adds little information about these parameters: σ is still more than half of the prior, so \
-         turncal keeps their values and σ from [imu.prior]. Add positions that put each axis up and down, and a turn of 90° or more about each axis. \
-         `turncal check` predicts the σ of each parameter."
+        "The recording adds little information about these parameters: each σ is still more than half of the prior σ, \
+         so turncal keeps the values and σ of [imu.prior]. Add positions that put each axis up and down, and a turn of \
+         90° or more about each axis. `turncal check` predicts the σ of each parameter."
         "The record adds little to what was assumed about some parameters."
     CombinationsNotObserved = "W05" "combinations-not-observed" Care:
         "Each of these parameters is determined on its own, but a combination of them is not, because their errors \
@@ -89,9 +89,9 @@ kinds! {
          gyros with noise below 0.1 °/√h and dwells of one minute."
         "The gyroscopes do not show north; U of the gyroscope biases includes the unknown part of Earth rate."
     NoiseLearnt = "W07" "noise-learnt" Care:
-        "A noise figure in [imu.noise] is more than 1.5 times too small for this recording (false-alarm rate 1 in 1000). \
-         turncal used its own estimate for weights and σ. To state the estimate for the next recording, copy the lines \
-         of the finding into run.toml; to use the stated noise anyway, add --noise stated."
+        "A noise figure in [imu.noise] is more than 1.5 times too small for this recording (false-alarm rate 1 in \
+         1000). turncal used its own estimate for the weights and the σ. To state the estimate for the next recording, \
+         copy the lines of the finding into run.toml; to use the stated noise anyway, add --noise stated."
         "The noise of the instrument was estimated from the record, because it exceeds the stated noise."
     ScatterAtRest = "W08" "scatter-at-rest" Care:
         "You asked for the stated noise, but in dwells the samples scatter more or less than this noise implies. The \
@@ -156,9 +156,8 @@ kinds! {
          of the calibration."
     RecordingsDiffer = "W26" "recordings-differ" Care:
         "The recordings of this instrument differ by more than their σ and [day_to_day] allow. turncal estimated the \
-         difference and \
-         included it in σ. Usual causes are bias changes at switch-on, remounting, and a temperature sensor away \
-         from the inertial sensors."
+         difference and included it in the σ. Usual causes are bias changes at switch-on, remounting, and a \
+         temperature sensor away from the inertial sensors."
         "The instrument changed between the recordings of the calibration; U includes the difference."
     LabelsContradicted = "W27" "labels-contradicted" Care:
         "The labels of some sections contradict gravity or the gyros. The finding lists these sections and states \

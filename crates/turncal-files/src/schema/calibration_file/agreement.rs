@@ -159,8 +159,8 @@ fn check_nis(record: &Calibration, consistency: &ConsistencyRecord) -> Checked {
         let [_, end] = nis_interval;
         expect!(
             is_told || *nis <= 1.0 + BEYOND * (end - 1.0),
-            "the finding W10 or W03 on a NIS beyond its limit",
-            "consistency: NIS ({name}) = {nis}, upper end of nis_interval = {end}, and no finding on it"
+            "finding W10 or W03 for a NIS beyond its limit",
+            "consistency: NIS ({name}) = {nis}, upper end of nis_interval = {end}, and no finding about it"
         );
     }
     Ok(())
