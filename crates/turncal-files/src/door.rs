@@ -29,7 +29,7 @@ pub struct Opened {
 struct Log {
     path: PathBuf,
     draft: Draft,
-    /// Rows of standard input, until written next to a result.
+    /// Rows of standard input, until they are written next to a result.
     piped: Option<TempDir>,
 }
 
@@ -57,7 +57,7 @@ impl Opened {
         Ok(opened)
     }
 
-    /// As [`Self::new`] for files in memory: a `run.toml` or a log, which may name the others.
+    /// Does the same as [`Self::new`] for files in memory: a `run.toml` or a log, and the files it may refer to.
     ///
     /// # Errors
     /// As for [`Self::new`].
@@ -108,7 +108,7 @@ impl Opened {
         Ok(Self { run, log })
     }
 
-    /// Reads a log that has grown, with the fields found before.
+    /// Reads a log that has grown, with the fields found earlier.
     ///
     /// # Errors
     /// [`FileError`] if it cannot be read.

@@ -8,10 +8,10 @@ use anyhow::bail;
 
 use turncal_logs::csv_file::{RowKind, is_remark};
 
-/// Bytes at the begin and the end of the file that are examined.
+/// Number of bytes examined at the beginning and at the end of the file.
 const LOOK: u64 = 1 << 16;
 
-/// A file of rows, which new rows of the same kind continue.
+/// A file of rows to which new rows of the same kind are appended.
 pub struct Continued {
     log: PathBuf,
     pub kind: RowKind,
@@ -56,8 +56,7 @@ impl Continued {
 
     /// Checks that the first lines of a source continue this file.
     ///
-    /// # Errors
-    /// If none of them is a row of the same kind, if they name other columns, or if the file contains all of them.
+    /// # Errors If no line is a row of the same kind, if the column names differ, or if the file already contains all rows.
     pub fn check(&self, first: &[Vec<u8>]) -> anyhow::Result<()> {
         let log = self.log.display();
         let lines = first.iter().filter(|line| !is_remark(line));
@@ -87,7 +86,7 @@ impl Continued {
     }
 }
 
-/// Bytes from here on, at most [`LOOK`].
+/// The bytes from this position on, at most [`LOOK`].
 fn look(file: &mut File, from: u64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     file.seek(SeekFrom::Start(from))?;

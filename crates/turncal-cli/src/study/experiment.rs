@@ -30,7 +30,7 @@ pub struct Experiment {
     /// Number of instruments
     #[arg(long, value_name = "N", default_value_t = 50, value_parser = at_least_two)]
     samples: u64,
-    /// Seed of all random numbers [default: from the scenario]
+    /// Random seed [default: from the scenario]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = seed)]
     seed: Option<u64>,
     /// Trajectory of the moving instrument: a TOML file or an embedded name

@@ -82,7 +82,7 @@ impl Draft {
         let mut imu = ImuFile {
             file: file.to_owned(),
             output: found.output,
-            // A rate that is asked for first may tell the units.
+            // The rate is requested first, because it may determine the units.
             sample_period_s: self.period(remarks),
             gyro_unit: self.unit(Sensor::Gyro, remarks),
             accel_unit: self.unit(Sensor::Accel, remarks),

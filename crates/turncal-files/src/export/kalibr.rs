@@ -91,7 +91,7 @@ type Split = (Matrix3<f64>, Matrix3<f64>);
 fn lower(a: &Matrix3<f64>) -> Split {
     let rotation = accelerometer_frame(a);
     let mut lower = a * rotation.transpose();
-    // Above the diagonal there is only rounding.
+    // The entries above the diagonal are only rounding errors.
     lower.fill_upper_triangle(0.0, 1);
     (lower, rotation)
 }

@@ -17,7 +17,7 @@ use turncal::units::{ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, HOUR, MILLIGAL, PPM};
 const M_PER_S_PER_SQRT_H: f64 = 1.0 / 60.0;
 
 pub fn write(values: &Values) -> Exported {
-    // `A_ij / A_ii`, the part of another axis' input that stays in the output.
+    // `A_ij / A_ii`, the part of the input along another axis that remains in the output.
     let misalignment = PerSensor::from_fn(|sensor| {
         let a = values.triads.get(sensor).sensitivity;
         Matrix3::from_fn(|i, j| if i == j { 0.0 } else { a[(i, j)] / a[(i, i)] })
@@ -100,7 +100,7 @@ fn noise(values: &Values) -> String {
         ),
         None => format!("#  corrtime:   # h: {missing}\n"),
     };
-    // A key without children is no mapping, so without figures it is a comment, too.
+    // A key without children is not a mapping, so without figures it becomes a comment too.
     let key = if values.period.is_some() {
         "imunoise:\n"
     } else {

@@ -40,7 +40,7 @@ pub fn write(values: &Values) -> Exported {
         }
         fields.push((sensor.name(), structure("", &of_triad)));
     }
-    // It is symmetric, so rows are columns.
+    // The matrix is symmetric, so rows equal columns.
     let covariance = values.record.covariance.concat();
     let size = values.record.covariance.len();
     fields.push(("covariance", numbers(size, &covariance)));
@@ -48,7 +48,7 @@ pub fn write(values: &Values) -> Exported {
     let mut file = vec![b' '; 124];
     let title = b"MATLAB 5.0 MAT-file, a calibration by turncal";
     file[..title.len()].copy_from_slice(title);
-    // No data of subsystems.
+    // No subsystem data.
     file[116..124].fill(0);
     file.extend([0x00, 0x01, b'I', b'M']);
     file.extend(structure("turncal", &fields));

@@ -27,7 +27,7 @@ pub struct Values<'a> {
     pub correction: Correction,
     /// From the axes of the format to right, front, up.
     pub order: AxisOrder,
-    /// Along the axes of the format.
+    /// Triads along the axes of the format.
     pub triads: PerSensor<Normalised>,
     /// Gyro output per specific force, along the axes of the format.
     pub g_sensitivity: Matrix3<f64>,
@@ -85,8 +85,8 @@ impl<'a> Values<'a> {
         })
     }
 
-    /// The unit of `N`. A count may belong to a rate or, per second, to an increment; the record does not distinguish
-    /// the two.
+    /// The unit of `N`. A count may be one of a rate or, per second, one of an increment; the record does not
+    /// distinguish the two.
     pub fn unit(&self, sensor: Sensor) -> String {
         let unit = self.record.unit.as_ref();
         match unit.map(|unit| unit.get(sensor).as_str()) {

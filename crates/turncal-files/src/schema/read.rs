@@ -1,4 +1,4 @@
-//! `run.toml` and the files that it names, read as one [`Run`].
+//! Reads `run.toml` and the files given in it as one [`Run`].
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -21,7 +21,7 @@ use turncal::units::{ARCSEC, DEGREE, MILLIGAL, PPM};
 use turncal_input::{Document, FileError, small_file, stated_gravity_sigma};
 use turncal_logs::DataFile;
 
-/// Reads `run.toml` and the files that it names, relative to itself.
+/// Reads `run.toml` and the files given in it, relative to itself.
 ///
 /// Everything is checked: known fields, finite and possible numbers, uniform time, overlapping files. Samples,
 /// nominal scales and priors are returned along right-front-up for any `body_axes`. Unstated site, noise, period
@@ -30,8 +30,8 @@ pub fn read_run(path: &Path) -> Result<Run, FileError> {
     run_of_text(path, &text_of(path)?, Some(path), &[])
 }
 
-/// Reads the text of a `run.toml` located (or assumed) next to this file and read from `source`; the files that it
-/// names may be in memory.
+/// Reads the text of a `run.toml` located (or assumed) next to this file and read from `source`; the files given in it
+/// may be in memory.
 pub fn run_of_text(
     path: &Path,
     text: &str,
@@ -86,7 +86,7 @@ pub fn run_of_text(
     Ok(run)
 }
 
-/// The file of the IMU that a `run.toml` names; it need not exist.
+/// The IMU file given in a `run.toml`; it need not exist.
 ///
 /// # Errors [`FileError`] if the `run.toml` is invalid.
 pub fn imu_file_of(path: &Path) -> Result<PathBuf, FileError> {
@@ -110,7 +110,7 @@ pub fn read_meta(path: &Path) -> Result<BTreeMap<String, String>, FileError> {
     Ok(meta)
 }
 
-/// Refuses a `run.toml` that [`crate::read_run`] would refuse for any content of the named files.
+/// Refuses a `run.toml` that [`crate::read_run`] would refuse for any content of the files given in it.
 pub fn check(document: Document) -> Result<(), FileError> {
     let run = run_file(document)?;
     let mut fields = Fields::new(document, &run, &[]);
