@@ -1,4 +1,4 @@
-//! What all readers share: errors that name file, line and field; TOML documents; checked numbers; units.
+//! Functions shared by all readers: errors with file, line and field; TOML documents; checked numbers; units.
 //!
 //! If a reader finds something other than it expects, a [`FileError`] gives what was found, what was expected, what to
 //! do, and where. [`Document`] gives these errors for TOML files, [`small_file`] reads a file as a whole with a limit

@@ -26,7 +26,7 @@ const GZIP: [u8; 2] = [0x1f, 0x8b];
 
 /// A file of rows, positioned at one row.
 ///
-/// Fields are separated by commas, semicolons, tabs or blanks, whichever most rows use. Lines that begin with `#`, `%`
+/// Fields are separated by commas, semicolons, tabs or blanks, according to most rows. Lines that begin with `#`, `%`
 /// or `//` are comments; those above the names, or above rows of numbers without names, are a preamble. Columns without
 /// names are called `1`, `2`, …. Numbers may have a decimal comma if commas are not separators; a time may be a clock
 /// time.
@@ -34,7 +34,7 @@ pub struct CsvFile {
     file: PathBuf,
     lines: Lines,
     heading: Heading,
-    /// For rows of several kinds, the tag of the selected ones and its column.
+    /// Tag of the selected rows, and its column, for rows of several kinds.
     tag: Option<(usize, String)>,
     row: Row,
     line: u64,
@@ -44,7 +44,7 @@ pub struct CsvFile {
 /// Uncertainty at the end of a file without a line ending.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Cut {
-    /// Last row lacks fields.
+    /// The last row lacks fields.
     Row,
     /// The last number of its last row may lack digits.
     Number,
@@ -107,7 +107,7 @@ impl CsvFile {
     }
 }
 
-/// The error for a text that is of another kind by its first line.
+/// The error for a text whose first line shows another kind of file.
 fn not_rows(file: &DataFile, lines: &Lines) -> Option<FileError> {
     let first = lines.ahead().next()?.text.trim_ascii_start();
     let (found, advice) = match first.first()? {
@@ -145,7 +145,7 @@ impl Rows for CsvFile {
         &self.heading.remarks
     }
 
-    /// Also false at a truncated last row.
+    /// The result is also false at a truncated last row.
     fn advance(&mut self, used: &[usize]) -> Result<bool, FileError> {
         let split = loop {
             let more = self.lines.advance();
@@ -199,7 +199,7 @@ impl Rows for CsvFile {
         String::from_utf8_lossy(self.bytes(column))
     }
 
-    /// Also true for placeholders of loggers.
+    /// The result is also true for placeholders of loggers.
     fn is_blank(&self, column: usize) -> bool {
         let bytes = self.bytes(column);
         bytes.is_empty() || bytes.eq_ignore_ascii_case(b"nan")

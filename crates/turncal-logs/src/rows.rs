@@ -9,7 +9,7 @@ use turncal_input::{FileColumn, FileError, Place};
 
 /// A file that provides rows of numbers in sequence.
 pub trait Rows {
-    /// The file, as errors name it.
+    /// The file name in errors.
     fn file(&self) -> &Path;
 
     /// The names of the columns.

@@ -15,7 +15,7 @@ use turncal::study::navigation::MethodOutlook;
 use turncal::study::path::{Evaluation, PathStudy, Without};
 use turncal::turntable::{Moves, Rotation};
 
-/// A term is not observed if more than this part of its prior σ remains.
+/// A term is not observed if more than this fraction of its prior σ remains.
 const NOT_SHOWN: f64 = 0.5;
 /// Number of combinations of parameters in the data.
 const LISTED: usize = 5;
@@ -30,7 +30,7 @@ pub struct Report<'a> {
     pub moves: &'a [String],
     /// Expected results.
     pub evaluation: &'a Evaluation,
-    /// Limits of the specification that the calibration is to decide, if any.
+    /// Limits of the specification to be decided by the calibration, if any.
     pub checks: Option<&'a [Check]>,
 }
 
@@ -40,7 +40,7 @@ struct NotShown {
     what: String,
     /// Remaining part of the prior σ.
     remaining: f64,
-    /// Change of a group relative to its σ by an error term of usual size, the largest of all groups.
+    /// Change caused by an error term of usual size, relative to the σ of the group; the largest over all groups.
     change_in_sigma: Option<f64>,
     shown_by: String,
 }
@@ -141,7 +141,7 @@ impl Report<'_> {
         facts
     }
 
-    /// σ of each group without what each move says, divided by σ with all moves.
+    /// σ of each group without the information from each move, divided by σ with all moves.
     fn moves(&self) -> Table {
         let (estimate, all) = (
             &self.evaluation.bound.estimate,
@@ -273,7 +273,7 @@ fn shown_by(direction: &Direction) -> String {
     let parts = direction.parts.iter();
     let largest = parts.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
     let name = largest.map_or("", |(name, _)| name.as_str());
-    // Of two axes, the second is the one that is turned about or points up.
+    // If there are two axes, the second is the axis of rotation or the upward axis.
     let axis = name.chars().last().unwrap_or_default();
     match (name.starts_with("gyro"), name.contains("bias")) {
         (true, true) => format!("longer dwells with {axis} in several directions"),

@@ -75,7 +75,7 @@ impl Look {
         }
     }
 
-    /// The fields if their number matches, with any delimiter; an empty one after the last is ignored.
+    /// The fields if their number matches, with any delimiter; an empty field at the end is ignored.
     fn fields(&self, delimiter: Delimiter, count: usize) -> Option<Vec<String>> {
         let fits = |mut fields: Vec<String>| {
             if fields.len() == count + 1 {
@@ -83,7 +83,7 @@ impl Look {
             }
             (fields.len() == count).then_some(fields)
         };
-        // The words of a sentence are no fields.
+        // The words of a sentence are not fields.
         let is_sentence = self.delimiter == Delimiter::Blanks;
         let own = || {
             self.fields
@@ -99,7 +99,7 @@ impl Look {
             .or_else(own)
     }
 
-    /// The same number of words, for names or units.
+    /// A line with the same number of words, for names or units.
     fn words(&self, delimiter: Delimiter, count: usize) -> Option<Vec<String>> {
         let fields = self.fields(delimiter, count)?;
         let filled = fields.iter().filter(|field| !field.is_empty()).count();
@@ -128,7 +128,8 @@ struct Shape {
 }
 
 impl Shape {
-    /// From the last rows, because names may be among the first; a last column that is always empty must have a name.
+    /// The shape is taken from the last rows, because names may be among the first; a last column that is always empty
+    /// must have a name.
     fn of(rows: &[&Look], all: &[Look]) -> Option<Self> {
         let rows = &rows[rows.len() - ROWS.min(rows.len().div_ceil(2))..];
         let mut shapes = BTreeMap::new();
@@ -286,8 +287,8 @@ impl Looks {
         })
     }
 
-    /// The same if no line has as many words as rows have columns: numbers, unless the lines above are mismatched names
-    /// or a mismatched row rather than a preamble.
+    /// The column names if no line has as many words as rows have columns: numbers, unless the lines above are
+    /// mismatched names or a mismatched row rather than a preamble.
     fn unnamed(&self, shape: &Shape, first: usize, is_tagged: bool) -> Result<Named, Stop> {
         let Self(looks) = self;
         let columns = shape.numbers.len();
@@ -377,7 +378,7 @@ fn value<'a>(says: &[&'a str], key: &str) -> Option<&'a str> {
     })
 }
 
-/// Units of a line of units, of clocks and of the scales that a preamble states.
+/// Units from a line of units, from clocks and from the scales stated in a preamble.
 fn units_with(
     units: Option<Vec<String>>,
     names: &[String],
@@ -425,7 +426,7 @@ fn names_and_units(levels: &[Vec<String>], is_comment: bool) -> (Vec<String>, Op
     (levels[0].clone(), levels.get(1).cloned())
 }
 
-/// Whether each names one column; units of two columns are often equal.
+/// Whether each word names one column; units of two columns are often equal.
 fn are_distinct(names: &[String]) -> bool {
     let mut sorted: Vec<&str> = names.iter().map(String::as_str).collect();
     sorted.retain(|name| !name.is_empty());
@@ -433,7 +434,7 @@ fn are_distinct(names: &[String]) -> bool {
     sorted.windows(2).all(|pair| pair[0] != pair[1])
 }
 
-/// The rate in Hz that a line such as `Update Rate: 100.0Hz` or `sampling rate,100` states.
+/// The rate in Hz from a line such as `Update Rate: 100.0Hz` or `sampling rate,100`.
 fn rate(remark: &str) -> Option<f64> {
     let remark = remark.to_lowercase();
     let (before, rest) = remark.split_once("rate").or(remark.split_once("freq"))?;
@@ -453,7 +454,7 @@ fn rate(remark: &str) -> Option<f64> {
     rate.filter(|_| in_hertz)
 }
 
-/// A text in UTF-8, or else in Latin 1, whose letters are those of Unicode.
+/// A text in UTF-8, otherwise in Latin 1 (the first 256 characters of Unicode).
 fn text_of(bytes: &[u8]) -> String {
     match std::str::from_utf8(bytes) {
         Ok(text) => text.to_owned(),
@@ -463,14 +464,14 @@ fn text_of(bytes: &[u8]) -> String {
 
 /// Whether a field is a number, with a point or a comma.
 fn is_number(field: &str) -> bool {
-    // A comma behind the last digit parts fields.
+    // A comma after the last digit separates fields.
     !field.ends_with(',') && field.replacen(',', ".", 1).parse::<f64>().is_ok()
 }
 
 /// Field separator of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Delimiter {
-    /// One byte.
+    /// A single byte.
     Byte(u8),
     /// Any number of spaces and tabs.
     Blanks,
@@ -487,14 +488,14 @@ impl Delimiter {
                 Self::Blanks
             };
         }
-        // A comma with a tab behind it is a comma.
+        // A comma followed by a tab counts as a comma.
         let parts = |byte: &u8| match Self::Byte(*byte).fields(row) {
             _ if !row.as_bytes().contains(byte) => false,
             Ok(fields) => {
                 fields.iter().filter(|field| !field.is_empty()).count() > 1
                     && !(*byte == b'\t' && fields.iter().any(|f| f.ends_with(',')))
             }
-            // Whoever reads the row by it says what is wrong.
+            // The code that reads the row with this separator reports the fault.
             Err(_) => true,
         };
         let byte = [b';', b'\t', b','].into_iter().find(parts);

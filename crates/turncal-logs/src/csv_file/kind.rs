@@ -30,7 +30,7 @@ impl RowKind {
         })
     }
 
-    /// Checks that a line is a row of this kind; otherwise says what was found and expected.
+    /// Checks that a line is a row of this kind; the error gives what was found and expected.
     pub fn check(&self, line: &[u8]) -> Result<(), String> {
         let row = split(line, self.delimiter);
         let (found, expected) = (row.len(), self.are_numbers.len());

@@ -67,7 +67,7 @@ impl Input {
         self.length.saturating_sub(self.offset)
     }
 
-    /// Reads `count` bytes, all of which must exist; `what` names them in errors.
+    /// Reads `count` bytes, all of which must exist; errors call them `what`.
     pub fn take(&mut self, count: u64, into: &mut Vec<u8>, what: &str) -> Result<(), Broken> {
         into.clear();
         if count > self.left() {

@@ -9,7 +9,7 @@ use turncal::study::{Accuracy, Figures, Ratio};
 
 const AGAINST_BOUND: &str = "| unit | RMS error | RMS σ | RMS bound | error/bound | 99 % interval";
 
-/// A quantity with expected value one, with the digits that are significant given its interval.
+/// A quantity with expected value one, with the digits that its interval allows.
 pub fn mean(mean: f64, (low, high): (f64, f64)) -> String {
     if mean < 10.0 {
         value(mean, 0.5 * (high - low))
@@ -40,7 +40,7 @@ fn sections(
         .collect()
 }
 
-/// RMS error, σ and bound in a unit, and the ratio of the first to the last.
+/// RMS error, σ and bound in a unit, and the ratio of error to bound.
 fn against_bound(of: &Figures, unit: f64) -> Vec<String> {
     let rms = [of.filter, of.claimed, of.bound].map(|rms| three_digits(rms / unit));
     rms.into_iter()
@@ -182,7 +182,7 @@ pub fn compared(accuracy: &Accuracy) -> Vec<Compared<'_>> {
     groups.chain(positions).collect()
 }
 
-/// A mission in a word.
+/// A mission in one word.
 pub fn journey_name(journey: Journey) -> &'static str {
     match journey {
         Journey::Standing => "stationary",

@@ -147,7 +147,7 @@ fn nees(accuracy: &Accuracy) -> (bool, String) {
     (side(of.mean, of.interval_998).0.is_eq(), text)
 }
 
-/// Sentences on innovations of the wrong size or whiteness.
+/// Sentences on innovations that have the wrong size or are not white.
 fn innovations(accuracy: &Accuracy, name: &str, nis: &Nis) -> Vec<(bool, String)> {
     let mut sentences = Vec::new();
     if let (Ordering::Less | Ordering::Greater, side) = side(nis.mean, nis.interval) {

@@ -6,7 +6,7 @@ use turncal::calibration::{Estimate, ParameterVector, to_vector};
 
 /// Half the width of a prior or limit.
 const HALF: f64 = 0.35;
-/// Standard deviations of an error bar.
+/// Half length of an error bar, in standard deviations.
 const SIGMAS: f64 = 2.0;
 
 impl Report<'_> {
@@ -68,7 +68,7 @@ impl Report<'_> {
         let names = indices.iter().map(|&i| axis_name(estimate.form(), i));
         let mut y = Axis::linear("").including([0.0]).room(0.08, 0.08);
         if !limits.is_empty() {
-            // Beside limits, a wide prior would hide what they decide.
+            // Next to limits, a wide prior would hide whether they are met.
             let ends = bars
                 .iter()
                 .flat_map(|(_, value, bar)| [value - bar, value + bar]);

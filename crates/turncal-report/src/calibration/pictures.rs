@@ -29,7 +29,7 @@ fn the_figure_of_the_readme_is_that_of_the_demo() {
     let of = (&checked, &checked.consequences(&problem, None));
     let document = document((&problem, "demo"), of, Some(&truth));
     let plot = document.plots().find(|plot| plot.file == "sigma.svg");
-    // README is read in a column as narrow as a printed page.
+    // README is displayed in a column as narrow as a printed page.
     let drawn = svg::draw_at(plot.unwrap(), svg::WIDTHS[1]);
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../.readme/sigma.svg");
     if std::env::var("INSTA_UPDATE").is_ok_and(|update| update == "always") {

@@ -6,7 +6,7 @@ use turncal::calibration::{
 };
 use turncal::imu::{InstallationForm, RATE, Sensor};
 
-/// Points of a curve.
+/// Number of points of a curve.
 const POINTS: usize = 81;
 
 /// Change of parameters with temperature, if they depend on it.

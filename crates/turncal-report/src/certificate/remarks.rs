@@ -4,7 +4,7 @@ use super::in_words;
 use turncal::calibration::Finding;
 use turncal::calibration::FindingKind as Kind;
 
-/// A sentence per kind of finding; a kind that this version does not know is named by its code.
+/// A sentence per kind of finding; a kind unknown to this version is given by its code.
 pub fn sentences(findings: &[Finding]) -> Vec<String> {
     let mut all: Vec<String> = Vec::new();
     for finding in findings {

@@ -17,7 +17,7 @@ pub fn degrees(angle: f64) -> String {
     value(angle / DEGREE, 1.0)
 }
 
-/// Such as `x up`.
+/// Direction of an axis, such as `x up`.
 pub fn way_up(axis: usize, down: bool) -> String {
     format!("{} {}", AXES[axis], if down { "down" } else { "up" })
 }

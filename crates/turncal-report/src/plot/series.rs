@@ -16,7 +16,7 @@ pub struct Series {
 /// Abscissa and ordinate. A line is interrupted if one of them is not a number.
 pub type Point = (f64, f64);
 
-/// Abscissa, lower and upper end.
+/// Abscissa, lower end and upper end.
 pub type Upright = (f64, f64, f64);
 
 /// Geometry of a series.
@@ -76,7 +76,7 @@ pub enum Color {
     Ink,
     /// Colour of unobtrusive elements.
     Quiet,
-    /// The n-th of six.
+    /// The n-th of six colours.
     Nth(usize),
 }
 

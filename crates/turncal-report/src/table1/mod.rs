@@ -7,9 +7,9 @@ use crate::prelude::*;
 use turncal::study::Table1;
 use turncal::study::table1::{AGREEMENT, ByQuantity, Column, Moments, QUANTITIES, Row, paper};
 
-/// Smaller figures, in the units shown, are shown as zero.
+/// Figures smaller than this, in the units shown, are shown as zero.
 const ZERO: f64 = 5e-10;
-/// Differences of more standard errors are shown only as larger than this.
+/// Differences of more than this many standard errors are shown only as larger.
 const MANY: f64 = 100.0;
 
 /// The complete report on the study.

@@ -16,8 +16,8 @@ pub fn short(verdict: &Verdict) -> &'static str {
     }
 }
 
-/// The last column of the table: the verdict where the reading is as stated, otherwise whether it gives
-/// the paper's figures.
+/// The last column of the table: the verdict if the reading is as stated, otherwise whether the reading gives the
+/// figures in the paper.
 pub fn of_row(column: &Column, row: &Row) -> String {
     match row.reading.kind {
         Kind::Stated => short(&column.verdict).to_owned(),

@@ -22,7 +22,7 @@ pub fn two_digits(of: f64, expanded: f64) -> (f64, f64) {
 pub fn results(certificate: &Certificate) -> Table {
     let has_budget = certificate.calibration.budget.is_some();
     let row = |of: &Measured| {
-        // Only a budget evaluates them, and it is one of the triads' parameters.
+        // Only a budget gives degrees of freedom, and only for parameters of the triads.
         let infinite = match of.quantity {
             Quantity::Parameters(_) if has_budget => "∞",
             _ => NONE,
