@@ -15,7 +15,7 @@ pub use wander::Wander;
 /// Meaning of the numbers in a time column.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum TimeUnit {
-    /// Times, with this number of units per second.
+    /// A unit of time, given as the number of units per second.
     PerSecond(f64),
     /// A counter of samples.
     Count,

@@ -37,7 +37,7 @@ pub enum BudgetSource {
     TableNorth,
     /// Non-orthogonality of the table axes.
     TableSquareness,
-    /// Wobble of its axes.
+    /// Wobble of the table axes.
     TableWobble,
     /// Encoder errors that repeat with angle.
     TableEncoder,

@@ -1,4 +1,4 @@
-//! Whether the gyros sense the Earth rate of the stated latitude.
+//! Test whether the gyros sense the Earth rate of the stated latitude.
 
 use nalgebra::Vector3;
 use serde_json::json;
@@ -61,7 +61,8 @@ pub fn earth_rate(problem: &Problem, outcome: &Outcome) -> Option<Finding> {
     })
 }
 
-/// Relative error of gravity if it was taken from the stated latitude and another one is right; zero if gravity is stated.
+/// Relative error of gravity, if it was computed from the stated latitude but another latitude is right; zero if
+/// gravity is stated.
 fn by_gravity(site: &Site, latitude: f64) -> f64 {
     let [taken, right] = [site.latitude, latitude].map(|of| normal_gravity(of, site.height));
     if (taken - site.gravity).abs() <= site.gravity_sigma {

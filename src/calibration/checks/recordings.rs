@@ -22,7 +22,7 @@ pub struct RecordingDifference {
 }
 
 impl RecordingDifference {
-    /// The difference of a group, found at a logarithm over the usual size; without its test.
+    /// The difference of a group, given the logarithm of its size over the usual size; the test is not filled in.
     pub(in crate::calibration) fn new(
         group: Group,
         model: &Model,

@@ -1,4 +1,4 @@
-//! Whether the table settles after its stops.
+//! Test whether the table settles after its stops.
 
 use serde_json::json;
 

@@ -10,7 +10,7 @@ use crate::calibration::{
 };
 use crate::statistics::FALSE_ALARM;
 
-/// A term that a path does not show is named if it widens the σ of a group by more than this.
+/// A term that a path does not show is reported if it increases the σ of a group by more than this factor.
 const NAMED: f64 = 1.25;
 
 /// Whether a candidate, absent with this probability, counts as present among this many candidates.
@@ -68,7 +68,7 @@ impl TermEvidence {
             } else {
                 of.known.effect_of(&candidates)?.1
             };
-            // Next to certain is not certain.
+            // Almost certain is not certain.
             let most = 1.0 - f64::EPSILON;
             Some(Self {
                 shown: absent.is_some_and(|absent| is_shown(absent, count)),
@@ -81,7 +81,7 @@ impl TermEvidence {
         terms.collect()
     }
 
-    /// The findings on terms that were not asked for.
+    /// The findings on terms that were not requested.
     pub(in crate::calibration) fn findings(all: &[Self]) -> Vec<Finding> {
         all.iter().filter_map(Self::finding).collect()
     }
@@ -118,7 +118,7 @@ impl TermEvidence {
         Some(Finding::new(Kind::TermNotShown, text, figures))
     }
 
-    /// The group whose σ the term widens most.
+    /// The group whose σ the term increases most.
     pub fn widest(&self) -> Option<(Group, f64)> {
         let groups = Group::all().zip(self.sigma_factors);
         let groups = groups.filter_map(|(group, factor)| Some((group, factor?)));
@@ -126,7 +126,7 @@ impl TermEvidence {
     }
 }
 
-/// σ of each group over that if the constants at these places were known.
+/// σ of each group, divided by its σ if the constants at these positions were known.
 fn factors(posterior: &Posterior, places: &[usize]) -> [Option<f64>; 6] {
     let covariance = &posterior.covariance;
     let across = covariance.select_columns(places);

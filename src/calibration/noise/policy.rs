@@ -19,7 +19,7 @@ impl NoisePolicy {
     /// All policies.
     pub const ALL: [Self; 3] = [Self::Stated, Self::Auto, Self::Learnt];
 
-    /// The name that command line and files use.
+    /// The name used on the command line and in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Stated => "stated",

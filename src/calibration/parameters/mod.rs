@@ -81,8 +81,8 @@ pub fn in_general_form(triads: &PerSensor<Triad>) -> PerSensor<Triad> {
     PerSensor::from_fn(|sensor| triads.get(sensor).in_form(InstallationForm::General))
 }
 
-/// Derivatives of a smooth function of unit scale, by central differences of sixth order; truncation and rounding
-/// errors are both about 1e-14.
+/// Derivatives of a smooth function with arguments of order one, by central differences of sixth order; truncation and
+/// rounding errors are both about 1e-14.
 pub fn derivatives<const M: usize, const N: usize>(
     at: &SVector<f64, N>,
     of: impl Fn(&SVector<f64, N>) -> SVector<f64, M>,

@@ -94,7 +94,7 @@ impl Counter {
                 Some(*gain)
             });
             let gains: Vec<f64> = gains.collect();
-            // Rows that are missing only according to later rows are missing before those later rows.
+            // If only later rows indicate a gap, it is before those rows, not here.
             let from_here_on = gains.iter().all(|&gain| gain > -ALIKE);
             match gains.last() {
                 Some(&gain) if from_here_on && gain > price + ALIKE => missing,
@@ -121,7 +121,8 @@ fn phase(times: &[f64], period: f64) -> f64 {
 /// period, beyond jitter and rounding, is due to a busy logger or a burst.
 pub fn punctual(stamps: &[(f64, u64)], period: f64) -> Vec<f64> {
     let mut times: Vec<f64> = stamps.iter().map(|&(time, _)| time).collect();
-    // Relative to a clock without gaps; the later rows that are each earlier than all rows between them and this one.
+    // Time relative to a clock without gaps. `behind`: later rows that are each earlier than all rows between them and
+    // this one.
     let against = |row: usize| stamps[row].0 - stamps[0].0 - row as f64 * period;
     let mut behind: VecDeque<usize> = VecDeque::new();
     for row in (0..stamps.len()).rev() {

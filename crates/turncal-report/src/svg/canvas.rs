@@ -185,7 +185,7 @@ impl Canvas {
         self.put(Circle::new(place(at), px(radius), style));
     }
 
-    /// Writes text, with the point at this fraction of its width; `scale` 1 is the usual size.
+    /// Writes text, with the point at this position of the text; `scale` 1 is the usual size.
     pub fn text(
         &mut self,
         text: &str,

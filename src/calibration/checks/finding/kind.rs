@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 pub enum Level {
     /// The values must not be used.
     Failed,
-    /// Part of what was asked was not determined.
+    /// Some of the requested parameters were not determined.
     Partial,
     /// The values may be used if the finding is taken into account.
     Care,

@@ -78,7 +78,7 @@ fn combinations(combinations: Vec<String>) -> Option<Finding> {
 /// The finding on the heading, with its 1σ after the run, rad.
 fn heading(sigma_rad: f64) -> Finding {
     let sigma_deg = sigma_rad / DEGREE;
-    // A larger σ is that of a uniform angle, which says nothing.
+    // A larger σ is that of a uniformly distributed angle and gives no information.
     let known = if sigma_deg < 90.0 {
         format!(" (σ = {sigma_deg:.1}°)")
     } else {

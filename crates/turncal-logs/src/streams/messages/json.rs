@@ -10,7 +10,7 @@ const LONGEST: usize = 64;
 /// Maximum number of columns, as in a spreadsheet.
 const MOST: usize = 16_384;
 
-/// The numbers of a message with their names; seconds and nanoseconds of a time are one number.
+/// The numbers of a message with their names; a time of seconds and nanoseconds is one number.
 fn numbers(bytes: &[u8], offset: u64) -> Result<Vec<(String, f64)>, Broken> {
     let value: Value =
         serde_json::from_slice(bytes).map_err(|error| Broken::new(offset, error, "JSON"))?;

@@ -8,7 +8,7 @@ use super::super::bytes::{Broken, Kind, Slice};
 use super::super::corrections::{Applied, Corrected, Undo};
 use turncal_input::{PerSensor, Sensor};
 
-/// Numbers of the calibrations of one kind of sensor.
+/// Number of calibrations stored for each kind of sensor.
 const CALIBRATIONS: usize = 4;
 
 /// `P` messages, and the devices selected by PX4.
