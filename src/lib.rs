@@ -40,8 +40,7 @@
 //! | parameter errors | true − estimated |
 //! | units | SI and radians everywhere; [`units`] are for input and output |
 //!
-//! # Rooms
-//! A [`recording::Recording`] holds only data. A [`run::Run`] adds prior knowledge: instrument, site, table.
+//! # Modules A [`recording::Recording`] holds only data. A [`run::Run`] adds prior knowledge: instrument, site, table.
 //! [`calibration::Options`] select the estimated quantities; a [`calibration::Problem`] preprocesses all of it once.
 //! Data flow in one direction: [`calibration`] solves, [`study`] evaluates by navigation and Monte Carlo, [`lot`] compares
 //! units of one type. [`earth`], [`attitude`], [`imu`], [`turntable`] and [`navigation`] do not depend on these;

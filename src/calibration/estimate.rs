@@ -42,7 +42,7 @@ impl Estimate {
         }
     }
 
-    /// Indices of the parameters whose σ remains more than half of these prior σ.
+    /// Indices of the parameters whose σ is still more than half of these prior σ.
     pub fn unobserved(&self, prior_sigma: &ParameterVector) -> Vec<usize> {
         let sigma = self.sigma();
         let hidden = |&index: &usize| {

@@ -18,12 +18,12 @@ impl AxisOrder {
         reversed: [false; 3],
     };
 
-    /// From front, right, down to right, front, up.
+    /// The order from front, right, down to right, front, up.
     pub const FRONT_RIGHT_DOWN: Self = Self {
         source: [1, 0, 2],
         reversed: [false, false, true],
     };
-    /// From front, left, up to right, front, up.
+    /// The order from front, left, up to right, front, up.
     pub const FRONT_LEFT_UP: Self = Self {
         source: [1, 0, 2],
         reversed: [true, false, false],

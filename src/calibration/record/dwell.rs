@@ -38,7 +38,7 @@ pub struct Rest {
 /// A step of a dwell.
 #[derive(Debug, Clone)]
 pub struct Standing {
-    /// When it ends, s.
+    /// End of the step, s.
     pub time: f64,
     /// Index of its model in the part.
     pub model: usize,

@@ -1,4 +1,4 @@
-//! A transition, and what is observed after it.
+//! A transition, and the observations after it.
 
 use nalgebra::Matrix3;
 

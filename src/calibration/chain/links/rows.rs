@@ -31,7 +31,7 @@ impl Rows {
         }
     }
 
-    /// Appends these rows below others.
+    /// Appends these rows to the rows `above`.
     pub fn and(self, above: Self) -> Self {
         let (m, k) = (above.values.len(), self.values.len());
         let mut all = above.of_more(k);
