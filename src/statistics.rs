@@ -9,7 +9,7 @@ use statrs::statistics::{Data, OrderStatistics};
 /// False-alarm rate of a whole list of checks, divided among them.
 pub const FALSE_ALARM: f64 = 1e-3;
 
-/// σ of a normal distribution over the median of its absolute deviations.
+/// σ of a normal distribution, divided by the median of its absolute deviations.
 pub const SIGMA_OF_MEDIAN: f64 = 1.482_602;
 
 /// The limit that χ² with these degrees of freedom exceeds with probability `chance`; infinite for zero degrees of

@@ -111,7 +111,7 @@ pub struct InstallationModel {
 }
 
 impl InstallationModel {
-    /// Finds and reads one.
+    /// Finds and reads an installation.
     ///
     /// # Errors
     /// If it does not exist or is malformed.
@@ -143,7 +143,7 @@ impl Instrument {
         }
     }
 
-    /// Finds and reads one.
+    /// Finds and reads an instrument.
     ///
     /// # Errors
     /// If it does not exist or is malformed.

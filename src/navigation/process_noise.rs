@@ -56,7 +56,7 @@ pub struct NoiseInput {
     pub duration: f64,
     /// ∫f_n dt, m/s.
     pub force: Vector3<f64>,
-    /// ∫|ω − ω_ie|² dt in rad²/s and ∫|f + g|² dt in m²/s³ if the block is part of a move, else zero.
+    /// ∫|ω − ω_ie|² dt in rad²/s and ∫|f + g|² dt in m²/s³ if the block is part of a move, otherwise zero.
     pub motion: PerSensor<f64>,
     /// Length in s if the block is part of a move, otherwise zero.
     pub moving: f64,

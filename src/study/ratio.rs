@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 const SAMPLES: usize = 2000;
 /// Probability outside the interval, half on each side.
 const OUTSIDE: f64 = 0.01;
-/// Seed of the bootstrap, whose draws are independent of those of the runs.
+/// Random seed of the bootstrap; its draws are independent of those of the runs.
 const SEED: u64 = 0;
 
 /// A ratio of root mean squares, or of medians.
@@ -69,8 +69,7 @@ pub fn median(of: &[f64], chosen: &[usize]) -> f64 {
     quantile(&values, 0.5)
 }
 
-/// The value below which this share of sorted values lies, by linear interpolation; NaN without
-/// values.
+/// The value below which this fraction of the sorted values lies, by linear interpolation; NaN without values.
 pub fn quantile(sorted: &[f64], share: f64) -> f64 {
     let place = share * sorted.len().saturating_sub(1) as f64;
     let (below, part) = (place as usize, place.fract());

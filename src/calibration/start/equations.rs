@@ -46,7 +46,7 @@ pub struct Drift {
 }
 
 impl Event {
-    /// Bias variation of each triad; `None` if its bias does not vary.
+    /// Bias variation of a triad over the event; `None` if its bias does not vary.
     pub fn drift(&self, sensor: Sensor, before: Option<&Self>) -> Option<Drift> {
         let GaussMarkov {
             sigma,

@@ -54,7 +54,7 @@ impl AtRest {
         of_stretch.collect()
     }
 
-    /// Time of the dwell, s.
+    /// Duration of the dwell, s.
     pub fn duration(&self) -> f64 {
         self.times[1] - self.times[0]
     }

@@ -238,7 +238,7 @@ fn shortened(position: &Position, sigma: f64) -> Matrix3<f64> {
     shortened
 }
 
-/// Effect as in [`Self::by_tilts`], with the tilts about each axis of the position with this number.
+/// The mean reduction of an input by tilts, and the tilts about each axis of the position with this number.
 fn by_tilts(position: &Position, sigma: f64, number: usize) -> [(Common, Matrix3<f64>); 2] {
     let tilts = skew(position.input) * sigma;
     [

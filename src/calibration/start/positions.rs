@@ -248,7 +248,7 @@ pub fn six_position_triad(
         errors: Vec::new(),
     });
     let observed = Observed {
-        // The same for both triads.
+        // Either triad would do.
         sensor: Sensor::Gyro,
         noise: Noise::default(),
         known: known.collect(),

@@ -1,4 +1,4 @@
-//! Faults in words.
+//! Descriptions of faults.
 
 use super::{Fault, FaultKind, Slower};
 use crate::recording::ImuSamples;
@@ -46,7 +46,7 @@ pub fn notes(imu: &ImuSamples) -> Vec<String> {
 }
 
 impl ImuSamples {
-    /// A sentence on a part of a lower rate: its rate, and how it is handled.
+    /// A sentence on a part with a lower rate: its rate and its treatment.
     fn of_rate(&self, part: &Slower) -> String {
         let [from, to] = [part.samples.start, part.samples.end].map(|k| self.time(k));
         let [usual, step] = [1, part.step].map(|samples| 1e3 * self.period * samples as f64);

@@ -1,5 +1,5 @@
-//! Navigation accuracy of the calibrations: position errors after 40 h of navigation (as in the paper) from perfect
-//! alignment, compared with the σ predicted from the filter covariance.
+//! Navigation accuracy of the calibrations: position errors after 40 h of navigation from perfect alignment (as in the
+//! paper), compared with the σ predicted from the filter covariance.
 
 use nalgebra::{Matrix2, SMatrix, Vector2};
 use statrs::distribution::{Binomial, DiscreteCDF};
@@ -216,7 +216,7 @@ impl Containment {
         })
     }
 
-    /// Whether the number within lies inside its interval.
+    /// Whether the number of runs within the region is inside its interval.
     pub fn as_claimed(&self) -> bool {
         (self.interval.0..=self.interval.1).contains(&self.within)
     }

@@ -138,7 +138,7 @@ fn calibrated(
             rejects_form,
         }
     };
-    // The noise that a scenario states is correct.
+    // The noise stated in a scenario is correct.
     let options = Options::default().noise(NoisePolicy::Stated);
     let problem = Problem::new(run, &options.installation(form));
     match estimator {

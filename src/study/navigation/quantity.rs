@@ -20,7 +20,7 @@ pub struct Quantity {
     pub key: &'static str,
     /// Index in [`Outlook::sigma`]; for a horizontal length, that of its first component.
     place: usize,
-    /// Whether the quantity has a sign, and a normal distribution where parameters have one.
+    /// Whether the quantity has a sign, and a normal distribution if the parameters have one.
     pub is_component: bool,
     units: Units,
 }

@@ -126,7 +126,7 @@ fn by_magnitude(run: &Run, motion: &Motion) -> Option<(Axes, f64)> {
         (Matrix3::zeros(), Vector3::zeros()),
         |(normal, right), of| (normal + of * of.transpose(), right + of),
     );
-    // With each axis up and down in some dwell, the sums for all axes are of similar size.
+    // With each axis up and down in some dwell, all eigenvalues are of similar size.
     let eigen = normal.symmetric_eigenvalues();
     let of_axes = (eigen.min() > eigen.max() / WIDEST.powi(2))
         .then(|| normal.cholesky())
