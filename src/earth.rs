@@ -106,7 +106,7 @@ pub struct Site {
     pub height: f64,
     /// Magnitude of gravity in m/s², including the centrifugal part.
     pub gravity: f64,
-    /// 1σ in m/s². The scale factors of all three accelerometers share the error of gravity.
+    /// 1σ in m/s². The scale factors of all three accelerometers share the gravity error.
     pub gravity_sigma: f64,
     /// Whether the site is known; otherwise Earth rotation is zero with the σ of [`Site::earth_rate_sigma`].
     #[serde(default = "known")]
@@ -144,7 +144,7 @@ impl Site {
         }
     }
 
-    /// A site with normal gravity, whose σ is the usual anomaly.
+    /// A site with normal gravity; its σ is the usual anomaly.
     pub fn with_normal_gravity(latitude: f64, longitude: f64, height: f64) -> Self {
         Self {
             latitude,

@@ -49,9 +49,9 @@
 //! # Crates
 //! This crate is the science: it reads no recording, prints nothing and draws nothing.
 //!
-//! | crate | what it does | what it knows |
+//! | crate | purpose | depends on |
 //! |---|---|---|
-//! | `turncal-input` | errors that name line and field, TOML documents, checked numbers, units | |
+//! | `turncal-input` | errors with line and field, TOML documents, checked numbers, units | |
 //! | `turncal` | calibrates, simulates, studies | `turncal-input` |
 //! | `turncal-logs` | turns logs into rows of numbers | `turncal-input` |
 //! | `turncal-files` | reads and writes runs and calibrations, drafts a `run.toml`, exports | all above |

@@ -142,7 +142,7 @@ pub struct AttitudePrior {
     pub earth_rate_sigma: Vector3<f64>,
 }
 
-/// 1σ of an initial attitude known from one reading only, which may be wrong, rad.
+/// 1σ of an initial attitude known from only one reading (which may be wrong), rad.
 const READ_ATTITUDE: f64 = DEGREE;
 /// σ of the initial level without a table, divided by its σ from the accelerometer prior: the data that gave this level
 /// are also observations and must determine it.

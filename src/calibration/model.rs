@@ -54,7 +54,7 @@ pub struct Model {
     pub term_sigma: TermVector,
     /// Error terms that may be absent; the estimate averages over their sizes.
     pub may_have: Vec<ErrorTerm>,
-    /// Whether the latitude may differ from the stated one, which only a table shows.
+    /// Whether the latitude may differ from the stated one (only a table shows this).
     pub may_be_elsewhere: bool,
     /// Temperature dependence of the instrument, if any.
     pub thermal: Option<Arc<ThermalModel>>,

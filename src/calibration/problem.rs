@@ -89,7 +89,7 @@ impl<'a> Problem<'a> {
         of
     }
 
-    /// The problem without recordings that have no dwell, which are reported; unchanged if none has a dwell.
+    /// The problem without recordings that have no dwell (these are reported); unchanged if no recording has a dwell.
     pub(in crate::calibration) fn of_dwells(self) -> Self {
         let has = |number: usize| {
             let mut of = self.stretches.iter().filter(|of| of.recording == number);

@@ -57,8 +57,8 @@ impl AxisOrder {
         Vector3::from_fn(|axis, _| self.sign(axis) * v[self.source[axis]])
     }
 
-    /// One value per axis, such as a σ or a nominal scale, which is independent of sign: a reversed axis changes the
-    /// sign of both input and output.
+    /// Rearranges one value per axis, such as a σ or a nominal scale. The value is independent of sign, because a
+    /// reversed axis changes the sign of both input and output.
     pub fn each(&self, v: Vector3<f64>) -> Vector3<f64> {
         Vector3::from(self.source.map(|axis| v[axis]))
     }

@@ -266,8 +266,8 @@ impl<'a> Search<'a> {
         self.judged(mixture, &covariance)
     }
 
-    /// Whether every process of a mixture contributes and is positive, except quantisation, which may be negative if it
-    /// models a bandwidth, and whether the sum is positive at every point.
+    /// Whether every process of a mixture contributes and is positive, and whether the sum is positive at every point.
+    /// Quantisation is excepted: it may be negative if it models a bandwidth.
     fn is_possible(&self, mixture: &[(Process, f64)]) -> bool {
         let (tau, variance) = (self.tau(), self.variance());
         let is_there = |&(process, strength): &(Process, f64)| {

@@ -29,7 +29,7 @@ pub struct TriadNoise {
 /// The noise of one axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AxisNoise {
-    /// Its Allan variance.
+    /// Allan variance of the axis.
     pub curve: Curve,
     /// Processes identified; `None` if samples do not vary at all.
     pub identified: Option<Identified>,

@@ -72,7 +72,7 @@ pub struct Given {
 }
 
 impl Scenario {
-    /// Finds and reads a scenario, by embedded name or path, and the models that it names.
+    /// Finds and reads a scenario, by embedded name or path, and the models that it refers to.
     ///
     /// # Errors
     /// If one of them does not exist or is malformed, or they do not fit together.

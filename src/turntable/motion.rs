@@ -93,7 +93,7 @@ impl Motion {
         self.stretch(time).chain.stands()
     }
 
-    /// Number of moves started before a time in s, which is the number of the current position.
+    /// Number of moves started before a time in s; this is also the number of the current position.
     pub fn position(&self, time: f64) -> usize {
         self.stretch(time).position
     }

@@ -114,7 +114,7 @@ impl Dispersion {
         Self(vec![1.0; problem.dwells().count()])
     }
 
-    /// Dispersion from these factors, divided by the factor of the median dwell, which is also returned.
+    /// Dispersion from these factors, divided by the factor of the median dwell; also returns this factor.
     pub fn of_dwells(mut factors: Vec<f64>) -> (Self, f64) {
         let middle = crate::statistics::median(&mut factors.clone()).unwrap_or(1.0);
         factors.iter_mut().for_each(|factor| *factor /= middle);

@@ -29,7 +29,7 @@ pub struct States {
     pub biases: PerSensor<usize>,
     /// Error of Earth rate, without a table.
     pub earth_rate: Option<usize>,
-    /// Error of gravity, if there are several sites.
+    /// Gravity error, if there are several sites.
     pub gravity: Option<usize>,
     /// State of each quantity that differs between recordings.
     pub own: Vec<(usize, OwnState)>,

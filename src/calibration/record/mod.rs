@@ -1,4 +1,4 @@
-//! Events of a recording: navigation, which does not depend on noise.
+//! Events of a recording, from navigation; they do not depend on the noise.
 
 pub mod dwell;
 pub mod schedule;

@@ -99,7 +99,7 @@ pub fn input_errors(triad: &Triad, correction: &Matrix3<f64>, input: &Vector3<f6
     correction * of_parameters(triad, input)
 }
 
-/// Response of rows to the mean noise of a triad over an event, which equals the response to its biases.
+/// Response of rows to the mean noise of a triad over an event; it equals the response to the biases.
 pub fn of_noise<const N: usize>(
     sensor: Sensor,
     event: usize,
@@ -221,7 +221,7 @@ struct Move {
 }
 
 impl Chain {
-    /// Starts from an attitude in the first dwell, which is levelled.
+    /// Starts from an attitude in the first dwell and levels it.
     ///
     /// Source: Tedaldi, Pretto, Menegatti 2014, "A robust and easy to implement method for IMU calibration
     /// without external equipments", ICRA, §IV.

@@ -442,7 +442,7 @@ mod tests {
         // Of first order in the tilts, and so as normal as they are.
         let (low, high) = mean_square_interval(6 * SETS, 1e-3);
         assert!((low..=high).contains(&squares[1]));
-        // Of second order: squares of squares, whose mean is as stated but spreads widely.
+        // Second order: squares of squares; their mean is as stated, but they scatter widely.
         assert!((0.5..1.5).contains(&squares[0]), "scale {}", squares[0]);
         assert!((0.5..1.5).contains(&squares[2]), "bias {}", squares[2]);
     }

@@ -174,7 +174,8 @@ impl<'a> Axis<'a> {
         halves.any(|half| self.is_off_level(run, half, limit) == Some(true))
     }
 
-    /// The same statistic, with two halves of this many rows on either side.
+    /// Whether the value of a run differs from the level on both sides, with two halves of this many rows on either
+    /// side.
     fn is_off_level(&self, run: &Range<usize>, half: usize, limit: Limit) -> Option<bool> {
         let first = run.start - 1;
         let before = &self.values[first.checked_sub(2 * half)?..first];

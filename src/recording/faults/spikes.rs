@@ -151,7 +151,7 @@ const LEADS: f64 = 1.0;
 /// σ beyond which a tenth of normal variates lie, two-sided.
 const TENTH: f64 = 1.645;
 
-/// A line through the nearest samples of a side, which are in order of their distance.
+/// A line through the nearest samples of a side, given in order of their distance.
 struct Line {
     /// Value extrapolated to the sample before the nearest.
     next: f64,

@@ -143,7 +143,7 @@ impl Windows {
         still
     }
 
-    /// The samples of a standstill, which consists of these windows, without those at its ends that differ from their
+    /// The samples of a standstill that consists of these windows, without windows at its ends that differ from their
     /// neighbours.
     fn settled(&self, windows: Range<usize>) -> Range<usize> {
         let Slide { length, step } = self.slide;

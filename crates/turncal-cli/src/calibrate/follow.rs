@@ -134,7 +134,7 @@ struct Followed<'a> {
     /// The run read last, and the size of the log when its fields were found.
     opened: Option<(Opened, u64)>,
     evaluator: Evaluator,
-    /// The calibration of earlier rows, which would delay the status.
+    /// The calibration of earlier rows, in the background because it would delay the status.
     calibrating: Option<JoinHandle<Option<InterimCalibration>>>,
 }
 

@@ -162,7 +162,7 @@ impl Write for Received {
     }
 }
 
-/// Whether this is a serial device, which does not wait for a reader.
+/// Whether this is a serial device (such a device does not wait for a reader).
 #[cfg(unix)]
 fn is_serial(source: &Path) -> bool {
     use std::os::unix::fs::FileTypeExt;

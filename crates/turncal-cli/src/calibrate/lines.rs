@@ -180,7 +180,7 @@ impl Lines {
 mod tests {
     use super::*;
 
-    /// Lines kept of these bytes, which arrive one by one, and the first reasons for those left out.
+    /// Lines kept of these bytes if they arrive one by one, and the first reasons for omitting the others.
     fn kept(begin_anywhere: bool, bytes: &str) -> (String, Vec<String>) {
         let mut lines = Lines::new(begin_anywhere, None);
         let bytes = bytes.as_bytes().chunks(1);

@@ -64,7 +64,7 @@ pub fn input_digests(run: &Path) -> Vec<(String, String)> {
     all
 }
 
-/// The content of a run.toml or a campaign.toml, which may be invalid; a log refers to no other files.
+/// The content of a run.toml or campaign.toml, even if it is invalid; a log refers to no other files.
 fn table_of(path: &Path) -> Table {
     if !is_toml(path) {
         return Table::new();

@@ -177,7 +177,8 @@ impl Draft {
         }
     }
 
-    /// Whether rows without a time show how long they last: rates, whose sums are angles.
+    /// Whether rows without a time show their duration: they do if they are rates, because the sums of rates are
+    /// angles.
     fn rows_show_period(&self) -> bool {
         let gyro = &self.quantities.units.gyro;
         self.columns.time.is_none()

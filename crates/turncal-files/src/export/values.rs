@@ -25,7 +25,7 @@ pub struct Values<'a> {
     pub record: &'a Calibration,
     /// Correction in the unit of the record, along right, front, up.
     pub correction: Correction,
-    /// From the axes of the format to right, front, up.
+    /// Axis order from the axes of the format to right, front, up.
     pub order: AxisOrder,
     /// Triads along the axes of the format.
     pub triads: PerSensor<Normalised>,

@@ -65,10 +65,10 @@ impl Course {
 
     /// Mean square error of the integral midway between two edges.
     ///
-    /// Every second edge is omitted and interpolated from its neighbours, and every fourth one from those two away. The
-    /// squared error due to white noise, which the filter models, grows linearly with edge distance, and that of a
-    /// signal not followed by the cubic with its eighth power. The two parts can therefore be separated; the signal
-    /// part at the actual distance is 2⁻⁸ of that at twice the distance.
+    /// Every second edge is omitted and interpolated from its neighbours, and every fourth edge from those two edges
+    /// away. The squared error due to white noise (modelled by the filter) grows linearly with the edge distance; that
+    /// of a signal not followed by the cubic grows with its eighth power. The two parts can therefore be separated; the
+    /// signal part at the actual distance is 2⁻⁸ of that at twice the distance.
     pub fn edge_error(&self) -> [f64; 3] {
         self.sums.each_ref().map(|sums| {
             let missed = |apart: usize| {
@@ -180,8 +180,8 @@ pub struct Even {
     resampled: Resampled,
 }
 
-/// Edges of drifting samples relative to uniform samples, which start with the first whole one; stamps are `lag`
-/// samples after the start of a sample.
+/// Edges of drifting samples relative to uniform samples; the uniform samples start with the first whole one. Stamps
+/// are `lag` samples after the start of a sample.
 pub fn place(wander: &Wander, lag: f64, edge: usize) -> f64 {
     wander.time(edge as f64 - lag) + lag
 }

@@ -43,7 +43,7 @@ const COUNTRIES: &str = "AD AE AF AG AI AL AM AO AQ AR AS AT AU AW AX AZ BA BB B
     PT PW PY QA RE RO RS RU RW SA SB SC SD SE SG SH SI SJ SK SL SM SN SO SR SS ST SV SX SY SZ TC TD TF TG TH TJ TK TL \
     TM TN TO TR TT TV TW TZ UA UG UM US UY UZ VA VC VE VG VI VN VU WF WS YE YT ZA ZM ZW";
 
-/// Reads and checks a lab.toml. `meta` contains metadata of the run, which complete `[item]`.
+/// Reads and checks a lab.toml. `meta` contains metadata of the run, to complete `[item]`.
 ///
 /// # Errors [`FileError`] that lists all empty or missing fields, or gives the first invalid one.
 pub fn read_laboratory(

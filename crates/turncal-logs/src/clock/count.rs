@@ -104,7 +104,7 @@ impl Counter {
     }
 }
 
-/// Offset from the first stamp to its due time, from the circular mean of the first phases, which gaps do not affect.
+/// Offset from the first stamp to its due time, from the circular mean of the first phases (not affected by gaps).
 fn phase(times: &[f64], period: f64) -> f64 {
     let turn = std::f64::consts::TAU / period;
     let (sin, cos) = times

@@ -1,4 +1,4 @@
-//! Kind of the rows of a text, which distinguishes rows from other lines as they arrive.
+//! Kind of the rows of a text, to distinguish rows from other lines as they arrive.
 
 use super::heading::Delimiter;
 use super::lines::{comment, has_content};

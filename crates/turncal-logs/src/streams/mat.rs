@@ -120,7 +120,7 @@ impl Reader {
         })
     }
 
-    /// Whether a compressed element is an array, whose size is then known.
+    /// Whether a compressed element is an array; its size is then known.
     fn is_array(&mut self) -> Result<bool, Broken> {
         self.end = 8;
         let (kind, size) = (self.whole("a type")?, self.whole("a size")?);

@@ -197,7 +197,7 @@ impl Database {
         }
     }
 
-    /// Number and content of a row, which may continue on overflow pages.
+    /// Number and content of a row; the content may continue on overflow pages.
     fn payload(&mut self, cell: &mut Slice) -> Result<(i64, Vec<u8>), Broken> {
         let offset = cell.offset();
         let size = varint(cell)?;

@@ -69,7 +69,7 @@ pub struct Canonical {
     pub covariance: Option<ParameterMatrix>,
     /// Whether the record gives correlations; if not, its errors are treated as independent.
     pub correlated: bool,
-    /// Auxiliary constants by name, which to first order do not depend on the body frame.
+    /// Auxiliary constants by name; to first order, they do not depend on the body frame.
     pub constants: BTreeMap<String, TermRecord>,
 }
 
@@ -151,8 +151,8 @@ impl Estimate {
     }
 }
 
-/// Triads in any body axes, converted to the axes of a body frame; unchanged for the table frame, which they do not
-/// determine.
+/// Triads in any body axes, converted to the axes of a body frame; unchanged for the table frame, because they do not
+/// determine it.
 pub fn in_body_frame(triads: &PerSensor<Triad>, body_frame: BodyFrame) -> PerSensor<Triad> {
     if body_frame == BodyFrame::Table {
         return *triads;

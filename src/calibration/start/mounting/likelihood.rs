@@ -74,7 +74,7 @@ impl Likelihoods {
     }
 }
 
-/// Likelihoods with a table, which gives gravity and turns: each triad is tested separately.
+/// Likelihoods with a table. The table gives gravity and turns, so each triad is tested separately.
 pub fn by_table(
     motion: &Motion,
     errors: &Errors,
@@ -96,7 +96,7 @@ pub fn by_table(
     })
 }
 
-/// Likelihoods with labels, which state the upward axis and the turn axis: each triad is tested separately.
+/// Likelihoods with labels. The labels state the upward axis and the turn axis, so each triad is tested separately.
 pub fn by_labels(motion: &Motion, errors: &Errors, orders: &[AxisOrder]) -> PerSensor<Likelihoods> {
     PerSensor::from_fn(|sensor| {
         Likelihoods::new(errors, orders, |equations, order| {

@@ -16,8 +16,8 @@ use crate::imu::{AxisOrder, PerSensor, Sensor};
 use crate::run::Run;
 use crate::statistics::median;
 
-/// Sensitivities from a tenth to ten times the stated one are tested, which is beyond the next two ranges of an
-/// instrument; wrong units are detected by their nominal scale when run.toml is read.
+/// Sensitivities from a tenth to ten times the stated one are tested (beyond the next two ranges of an instrument);
+/// wrong units are detected by their nominal scale when run.toml is read.
 const WIDEST: f64 = 10.0;
 /// Each tested sensitivity is this many times the previous one, so that the residual rotation between two of them is in
 /// the linear range.
