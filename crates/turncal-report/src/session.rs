@@ -65,7 +65,10 @@ pub fn screen(run: &Run, status: &Status, specification: Option<&Specification>)
     }
     lines.push(match status.next {
         Some(next) => format!("next: {}, then keep still for 5 s", words(next)),
-        None => "the σ of the calibration are small enough to decide every limit of the specification".to_owned(),
+        None => {
+            "the σ of the calibration are small enough to decide every limit of the specification"
+                .to_owned()
+        }
     });
     lines
 }

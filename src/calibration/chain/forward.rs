@@ -11,7 +11,7 @@ use crate::calibration::{CalibrationError, Constant, Known, Posterior, Prior, Pr
 /// Number of links whose rows are added at once.
 const BLOCK: usize = 100;
 
-/// A link after the filter has passed it.
+/// A filtered link.
 #[derive(Debug, Clone)]
 pub struct Passed {
     /// States before the rows: mean given zero constants, effect of the constants, and covariance.
@@ -37,7 +37,7 @@ struct Forward {
     log_determinant: f64,
 }
 
-/// A chain after the filter has passed it.
+/// A filtered chain.
 pub struct Filtered<'a> {
     pub chain: &'a Chain,
     pub sizes: Sizes,

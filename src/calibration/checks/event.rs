@@ -30,7 +30,7 @@ pub enum EventKind {
     Slip(Slip),
 }
 
-/// An event that is larger than its effect produces by chance, in spite of the heavy tails.
+/// An event too large to be produced by its effect by chance, in spite of the heavy tails.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Event {
     /// Kind.

@@ -24,7 +24,7 @@ const NO_NOISE: f64 = 1e-3;
 ///
 /// A step lasts a tenth of a second, as in the filter: faster errors average out, and only random walk, bias and
 /// vibration of the mount remain. The result does not change the calibration, because it does not distinguish between
-/// them.
+/// these three causes.
 pub fn scatter_at_rest(problem: &Problem, calibrated: &PerSensor<Triad>) -> Vec<Finding> {
     let runs = problem.runs().enumerate();
     let each = runs.flat_map(|(recording, run)| Sensor::ALL.map(|sensor| (recording, run, sensor)));

@@ -73,7 +73,8 @@ impl Parts {
         for (directory, part) in &parts[1..] {
             if let Some(difference) = reference.job.any_difference(&part.job) {
                 let first = first.display();
-                let found = format!("a part of a job that differs from that of {first} ({difference})");
+                let found =
+                    format!("a part of a job that differs from that of {first} ({difference})");
                 let advice = "Merge only parts made by the same version, with the same arguments, on processors of the \
                               same type.";
                 return Err(FileError::of(

@@ -144,7 +144,8 @@ impl Quantities {
         self.output = output;
         self.output_why = match output {
             Output::Pulse => {
-                "integer counts whose remainder is carried into the next row, as in pulse outputs".into()
+                "integer counts whose remainder is carried into the next row, as in pulse outputs"
+                    .into()
             }
             Output::Increment => {
                 let period = rounded(rows.period, 4);

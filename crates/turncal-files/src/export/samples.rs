@@ -26,7 +26,7 @@ const TASKS: usize = 64;
 /// The samples of a run to write.
 #[derive(Debug, Clone, Copy)]
 pub struct Samples<'a> {
-    /// The run of the samples.
+    /// The run that contains the samples.
     pub run: &'a Run,
     /// Correction.
     pub correction: &'a Correction,

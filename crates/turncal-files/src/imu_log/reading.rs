@@ -104,7 +104,9 @@ impl<'a> Reading<'a> {
         let file = self.log.source.file.display();
         let blank = (self.blank > 0).then(|| {
             let rows = counted(self.blank, "row");
-            format!("turncal skipped {rows} of {file} in which the columns of both triads are empty.")
+            format!(
+                "turncal skipped {rows} of {file} in which the columns of both triads are empty."
+            )
         });
         let lacking = (self.lacking > 0).then(|| {
             let rows = counted(self.lacking, "row");

@@ -290,8 +290,7 @@ fn place_note(site: &Site, has_gravity: bool, has_height: bool) -> Option<String
         (true, false) => ("height", "height_m (--height)"),
         (true, true) => return None,
     };
-    let of_rate =
-        "estimated Earth rate as an unknown vector (larger σ of the gyro biases)";
+    let of_rate = "estimated Earth rate as an unknown vector (larger σ of the gyro biases)";
     let of_gravity = format!(
         "assumed a gravity of {:.4} ± {:.4} m/s² (larger σ of the accelerometer scale factors)",
         site.gravity, site.gravity_sigma

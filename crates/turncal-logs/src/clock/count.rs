@@ -117,8 +117,8 @@ fn phase(times: &[f64], period: f64) -> f64 {
 
 /// Row times, with late rows at the latest time allowed by the following rows.
 ///
-/// A row was sampled before the following ones, by one period each. A stamp that contradicts this by more than a
-/// period, beyond jitter and rounding, is due to a busy logger or a burst.
+/// Each row was sampled one period before the next. A stamp that contradicts this by more than a period, beyond jitter
+/// and rounding, is due to a busy logger or a burst.
 pub fn punctual(stamps: &[(f64, u64)], period: f64) -> Vec<f64> {
     let mut times: Vec<f64> = stamps.iter().map(|&(time, _)| time).collect();
     // Time relative to a clock without gaps. `behind`: later rows that are each earlier than all rows between them and
