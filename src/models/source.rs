@@ -186,8 +186,9 @@ pub fn text(room: Room, name_or_path: &str, named_in: &Place) -> Result<Text, Mo
             place: Place::Embedded,
         });
     }
+    let lower = name_or_path.to_lowercase();
     let nearest = names(room)
-        .map(|name| (strsim::jaro_winkler(name, name_or_path), name))
+        .map(|name| (strsim::jaro_winkler(name, &lower), name))
         .filter(|&(likeness, _)| likeness > 0.7)
         .max_by(|a, b| a.0.total_cmp(&b.0));
     Err(ModelError::Unknown {

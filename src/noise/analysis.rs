@@ -141,6 +141,8 @@ impl Stretch {
 
 fn times(run: &Run, samples: &Range<usize>) -> String {
     let at = |sample| run.recording.imu.time(sample);
+    // Zero has no sign.
+    let at = |row| (10.0 * at(row)).round() / 10.0 + 0.0;
     format!("{:.1} s to {:.1} s", at(samples.start), at(samples.end))
 }
 

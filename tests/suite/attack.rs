@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use assert_cmd::Command;
 use serde_json::Value;
+use turncal::calibration::Calibration;
 
 use crate::shared::shared;
 
@@ -216,6 +217,84 @@ fn a_time_in_another_unit_and_rows_that_are_left_out_are_told_by_gravity() {
         let says = "sample_period_s or time_unit";
         refused(&format!("wrong-input-{case}"), closed_form, says);
     }
+}
+
+fn calibration(directory: &Path, run: &str) -> Calibration {
+    let (status, output, message) = turncal(directory, &format!("calibrate {run} --json"));
+    assert_eq!(status, 0, "{run}: {message}");
+    serde_json::from_str(&output).unwrap()
+}
+
+/// A record that [`shared`] has, under a directory of its own.
+fn record(name: &str) -> Option<tempfile::TempDir> {
+    let from = shared(name)?;
+    let copy = tempfile::tempdir().unwrap();
+    copied(&from, copy.path());
+    Some(copy)
+}
+
+/// Rows with as little noise as that moved what gravity hardly shows until the start had no inverse.
+#[test]
+fn accelerometer_noise_stated_a_tenth_is_learnt() {
+    let Some(directory) = record("real-mems-six-position") else {
+        return;
+    };
+    let here = directory.path();
+    let run = std::fs::read_to_string(here.join("run.toml")).unwrap();
+    let stated = "velocity_random_walk_ug_per_sqrt_hz = 130.0";
+    let tenth = run.replace(stated, "velocity_random_walk_ug_per_sqrt_hz = 13.0");
+    assert_ne!(run, tenth);
+    std::fs::write(here.join("tenth.toml"), tenth).unwrap();
+    let (found, expected) = (
+        calibration(here, "tenth.toml"),
+        calibration(here, "run.toml"),
+    );
+    for name in &expected.parameters {
+        let off = (found.get(name).unwrap() - expected.get(name).unwrap()).abs();
+        assert!(off <= *expected.sigma_of(name).unwrap(), "{name}: {off}");
+    }
+}
+
+#[test]
+fn a_unit_a_scale_or_a_period_of_the_gyros_that_turns_contradict_is_named() {
+    let Some(directory) = record("real-mems-six-position") else {
+        return;
+    };
+    let here = directory.path();
+    let run = std::fs::read_to_string(here.join("run.toml")).unwrap();
+    let (unit, degrees) = ("gyro_unit = \"deg/s\"", "57.29577951308232");
+    for (wrong, says) in [
+        (
+            run.replace(unit, "gyro_unit = \"rad/s\"")
+                .replace(degrees, "1.0"),
+            "gyro_unit = \"deg/s\"",
+        ),
+        (
+            run.replace(unit, "gyro_unit = \"rad/s\""),
+            "expected about 1",
+        ),
+        (run.replace(degrees, "68.75"), "prior.gyro.scale"),
+        (run.replace(degrees, "45.8"), "prior.gyro.scale"),
+    ] {
+        std::fs::write(here.join("wrong.toml"), wrong).unwrap();
+        let (status, _, message) = turncal(here, "calibrate wrong.toml --json");
+        assert!(status == 1 && message.contains(says), "{says}: {message}");
+    }
+}
+
+/// The attitude jumps at the seam, which is one event among the others.
+#[test]
+fn a_record_twice_in_one_file_takes_hardly_more_passes_than_once() {
+    let Some(directory) = record("real-mems-lot-0") else {
+        return;
+    };
+    let here = directory.path();
+    let once = calibration(here, "run.toml");
+    let log = std::fs::read_to_string(here.join("imu.log")).unwrap();
+    std::fs::write(here.join("imu.log"), log.repeat(2)).unwrap();
+    let twice = calibration(here, "run.toml");
+    let (once, twice) = (once.passes.unwrap(), twice.passes.unwrap());
+    assert!(twice <= 2 * once, "{once} {twice}");
 }
 
 #[test]

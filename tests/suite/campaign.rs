@@ -156,6 +156,11 @@ fn autopilots_take_off_the_bias_at_a_temperature() {
         let done = turncal(here, &arguments);
         assert!(done.status.success(), "{}", words(&done));
         let text = String::from_utf8(done.stdout).unwrap();
+        let comments = text.lines().filter(|line| line.starts_with('#'));
+        assert!(comments.count() <= 6, "{text}");
+        // No log of samples holds the identities without which PX4 skips these parameters.
+        let told = ["TC_G0_ID", "TC_A0_ID"].map(|id| text.contains(id));
+        assert_eq!(told, [format == "px4"; 2]);
         let value = |name: &str| -> f64 {
             let line = text.lines().find(|line| {
                 let mut fields = line.split(['\t', ',']);

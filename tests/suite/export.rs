@@ -7,11 +7,12 @@ use std::process;
 
 use assert_cmd::Command;
 use nalgebra::{Matrix3, Vector3};
-use turncal::calibration::result::{Calibration, TermRecord, TestVector, TriadRecord};
+use turncal::calibration::result::{Calibration, NoiseRecord, TermRecord, TestVector, TriadRecord};
+use turncal::calibration::{NoisePolicy, NoiseReport, Source, SourceFigures};
 use turncal::imu::{BodyFrame, GaussMarkov, Noise, Nominal, PerSensor};
 use turncal::run::Run;
-use turncal::units::{ARCSEC, DEG_PER_H};
-use turncal_files::export::{Format, write};
+use turncal::units::{ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, MICRO_G_PER_SQRT_HZ};
+use turncal_files::export::{FORMATS, Format, write};
 
 use crate::calibration_file::written;
 use crate::door::made::made_run;
@@ -213,25 +214,36 @@ pub fn yaml(text: &str) -> BTreeMap<String, Vec<f64>> {
     values
 }
 
-/// The numbers of the comment that begins like this, in all its brackets.
-pub fn comment(text: &str, begin: &str) -> Vec<f64> {
-    let line = text.lines().find(|l| l.starts_with(&format!("# {begin}")));
-    let line = line.unwrap_or_else(|| panic!("no `{begin}` in {text}"));
+/// The numbers in the brackets of the comment with these words.
+pub fn comment(text: &str, words: &str) -> Vec<f64> {
+    let line = text
+        .lines()
+        .find(|l| l.starts_with('#') && l.contains(words));
+    let line = line.unwrap_or_else(|| panic!("no `{words}` in {text}"));
     let lists = line.split('[').skip(1).filter_map(|l| l.split(']').next());
     lists.flat_map(numbers).collect()
 }
 
 /// What the comment says raw output is divided by, gyros first.
 pub fn divisors(text: &str) -> [Vector3<f64>; 2] {
-    halves(&comment(text, "to convert the raw").try_into().unwrap())
+    halves(
+        &comment(text, "raw output per second divided by")
+            .try_into()
+            .unwrap(),
+    )
+}
+
+/// The biases of a comment, gyros first.
+pub fn biases(text: &str) -> [Vector3<f64>; 2] {
+    halves(&comment(text, "bias of gyroscopes").try_into().unwrap())
 }
 
 /// Kalibr's measurement model, from its file alone: angular rate and specific force along the body
 /// axes of the calibration to the measured ones.
 fn kalibr_measures(text: &str, rate: Vector3<f64>, force: Vector3<f64>) -> [Vector3<f64>; 2] {
     let file = yaml(text);
-    let matrix = |key: &str| Matrix3::from_row_slice(&file[&format!("imu0.{key}")]);
-    let pose = &file["imu0.T_i_b"];
+    let matrix = |key: &str| Matrix3::from_row_slice(&file[key]);
+    let pose = &file["T_i_b"];
     let imu_b = Matrix3::from_fn(|i, j| pose[4 * i + j]);
     let [m_gyro, a, gyro_imu, m_accel] = [
         "gyroscopes.M",
@@ -242,16 +254,16 @@ fn kalibr_measures(text: &str, rate: Vector3<f64>, force: Vector3<f64>) -> [Vect
     .map(matrix);
     for lower in [m_gyro, m_accel] {
         assert_eq!([lower[(0, 1)], lower[(0, 2)], lower[(1, 2)]], [0.0; 3]);
-        assert!(lower.diagonal().iter().all(|&d| (d - 1.0).abs() < 0.02));
+        assert!(lower.diagonal().iter().all(|&d| (d - 1.0).abs() < 0.05));
     }
     for rotation in [imu_b, gyro_imu] {
         assert!((rotation * rotation.transpose() - Matrix3::identity()).amax() < 1e-14);
         assert!((rotation.determinant() - 1.0).abs() < 1e-14);
     }
-    let bias = |name: &str| Vector3::from_vec(comment(text, &format!("bias of {name}")));
+    let [bias_gyro, bias_accel] = biases(text);
     [
-        m_gyro * (gyro_imu * imu_b * rate) + a * (gyro_imu * imu_b * force) + bias("gyroscopes"),
-        m_accel * (imu_b * force) + bias("accelerometers"),
+        m_gyro * (gyro_imu * imu_b * rate) + a * (gyro_imu * imu_b * force) + bias_gyro,
+        m_accel * (imu_b * force) + bias_accel,
     ]
 }
 
@@ -259,7 +271,7 @@ fn kalibr_measures(text: &str, rate: Vector3<f64>, force: Vector3<f64>) -> [Vect
 fn kalibrs_equations_measure_the_raw_output_of_the_test_vectors() {
     let record = record();
     let text = exported(&record, "kalibr").0;
-    assert!(text.contains("\n  model: scale-misalignment\n"));
+    assert!(text.contains("\nmodel: scale-misalignment\n"));
     let divisors = divisors(&text);
     for vector in &record.test_vectors {
         let [rate, force] = halves(&vector.calibrated);
@@ -284,7 +296,7 @@ fn kalibr_holds_g_sensitivity_and_names_the_terms_that_it_does_not_hold() {
     );
     let note = notes.iter().find(|n| n.contains("error terms")).unwrap();
     assert!(note.contains("accel-second-order") && !note.contains("g-sensitivity"));
-    assert!(text.contains(note.as_str()) && text.contains("accel.second_order.x = 1e-6"));
+    assert!(text.contains(note.as_str()));
 }
 
 #[test]
@@ -296,7 +308,7 @@ fn along_the_accelerometers_kalibrs_body_is_its_imu() {
     }
     let file = yaml(&exported(&record, "kalibr").0);
     let identity: Vec<f64> = (0..16).map(|k| f64::from(u8::from(k % 5 == 0))).collect();
-    assert_eq!(file["imu0.T_i_b"], identity);
+    assert_eq!(file["T_i_b"], identity);
 }
 
 /// KF-GINS' compensation, from its file alone: right, front, up in and out.
@@ -326,22 +338,16 @@ fn kf_gins_gives_the_test_vectors_but_for_the_misalignment_that_the_file_states(
         "{}",
         notes[0]
     );
-    let lost: Vec<Vector3<f64>> = ["gyro", "accel"]
-        .iter()
-        .flat_map(|sensor| ["front", "right", "down"].map(|axis| format!("lost, {sensor} {axis}:")))
-        .map(|begin| {
-            let line = text.lines().find(|l| l.contains(&begin)).unwrap();
-            Vector3::from_vec(numbers(line.split_once(':').unwrap().1)) * ARCSEC
-        })
-        .collect();
     for vector in &record.test_vectors {
         let found = kf_gins_compensates(&text, halves(&vector.raw));
         for (k, expected) in halves(&vector.calibrated).into_iter().enumerate() {
-            let frd = Vector3::new(expected.y, expected.x, -expected.z);
-            let stays = Vector3::from_fn(|i, _| lost[3 * k + i].dot(&frd));
-            let stays = Vector3::new(stays.y, stays.x, -stays.z);
-            // The file gives what is lost to a thousandth of an arcsec.
-            assert!((found[k] - expected - stays).amax() < 1e-8 * frd.norm().max(1.0));
+            // Along right, front, up the misalignment is that of the record.
+            let triad = [&record.gyro, &record.accel][k];
+            let stays = Matrix3::from_fn(|i, j| match i == j {
+                true => 0.0,
+                false => triad.installation[i][j],
+            });
+            assert_near(found[k], expected + stays * expected);
         }
     }
 
@@ -396,12 +402,16 @@ fn a_run_gives_noise_figures_sample_rate_and_nominal_scales() {
     let near = |key: &str, expected: f64| {
         assert!((file[key][0] / expected - 1.0).abs() < 1e-12, "{key}");
     };
-    near("imu0.gyroscope_noise_density", 2e-5);
-    near("imu0.gyroscope_random_walk", 4e-8);
-    near("imu0.accelerometer_noise_density", 5e-5);
-    near("imu0.update_rate", 128.0);
-    assert!(!file.contains_key("imu0.accelerometer_random_walk"));
-    assert!(text.contains("# accelerometer_random_walk:"));
+    near("gyroscope_noise_density", 2e-5);
+    near("gyroscope_random_walk", 4e-8);
+    near("accelerometer_noise_density", 5e-5);
+    near("update_rate", 128.0);
+    // The run states no variation of the accelerometers' bias: three times their white noise after 100 s.
+    near(
+        "accelerometer_random_walk",
+        3.0 * 5e-5 * (2.0 / 100.0f64).sqrt() / 10.0,
+    );
+    assert!(text.contains("m/s^2/s/sqrt(Hz), usual for this noise density"));
     assert_eq!(divisors(&text)[0], Vector3::new(2e6, 2.1e6, 2.2e6));
     let [rate, force] = halves(&INPUTS[1]);
     let accel = kalibr_measures_any_scale(&text, force);
@@ -419,23 +429,274 @@ fn a_run_gives_noise_figures_sample_rate_and_nominal_scales() {
 
 fn kalibr_measures_any_scale(text: &str, force: Vector3<f64>) -> Vector3<f64> {
     let file = yaml(text);
-    let pose = &file["imu0.T_i_b"];
+    let pose = &file["T_i_b"];
     let imu_b = Matrix3::from_fn(|i, j| pose[4 * i + j]);
-    let bias = Vector3::from_vec(comment(text, "bias of accelerometers"));
-    Matrix3::from_row_slice(&file["imu0.accelerometers.M"]) * (imu_b * force) + bias
+    Matrix3::from_row_slice(&file["accelerometers.M"]) * (imu_b * force) + biases(text)[1]
 }
 
 #[test]
-fn without_a_run_noise_keys_are_comments_that_say_where_figures_come_from() {
-    for format in ["kalibr", "kf-gins"] {
-        let text = exported(&record(), format).0;
-        let keys = yaml(&text);
-        assert!(
-            keys.keys()
-                .all(|k| !k.contains("noise") && !k.contains("rate")),
-            "{text}"
+fn without_noise_the_keys_that_a_program_requires_are_named_and_the_file_has_none_of_them() {
+    let of_kalibr = ["update_rate", "noise_density", "random_walk"];
+    for (format, names) in [
+        ("kalibr", &of_kalibr[..]),
+        ("open-vins-kalibr", &of_kalibr),
+        ("kf-gins", &["arw", "vrw", "gbstd", "abstd", "corrtime"]),
+    ] {
+        let (text, notes) = exported(&record(), format);
+        let note = notes.iter().find(|note| note.contains("turncal allan"));
+        for name in names {
+            assert!(note.unwrap().contains(name), "{notes:?}");
+            let keys = yaml(text.trim_start_matches("%YAML:1.0"));
+            assert!(keys.keys().all(|key| !key.contains(name)), "{text}");
+        }
+    }
+}
+
+/// The rule by which `cv::FileStorage` reads YAML (OpenCV 4 and 5, `persistence_yml.cpp`), as far as these files need
+/// it: the first line is its own, the rows of a list are indented deeper than its key, tabs are not allowed, and a text
+/// without quotes includes the comment behind it. The texts of quoted keys.
+fn opencv(text: &str) -> BTreeMap<String, String> {
+    let text = text
+        .strip_prefix("%YAML:1.0\n")
+        .expect("its own first line");
+    let indent = |line: &str| line.len() - line.trim_start().len();
+    let (mut key_indent, mut texts) = (0, BTreeMap::new());
+    for line in text
+        .lines()
+        .filter(|line| !line.trim_start().starts_with('#'))
+    {
+        assert!(!line.contains('\t'), "{line}");
+        if line.trim_start().starts_with("- ") {
+            assert!(indent(line) > key_indent, "Incorrect indentation: {line}");
+            continue;
+        }
+        key_indent = indent(line);
+        let (key, value) = line.trim().split_once(':').unwrap();
+        let number = value.split('#').next().unwrap().trim();
+        if !number.is_empty() && number.parse::<f64>().is_err() {
+            let inner = value
+                .trim()
+                .strip_prefix('"')
+                .and_then(|v| v.strip_suffix('"'));
+            texts.insert(key.to_owned(), inner.expect(line).to_owned());
+        }
+    }
+    texts
+}
+
+/// Keys below `imu0` that OpenVINS does not start without: `VioManagerOptions::print_and_load_noise`,
+/// `print_and_load_state`, `StateOptions::print` (the model) and `ROS1Visualizer::setup_subscribers` (the topic).
+#[test]
+fn open_vins_finds_every_key_that_it_requires_in_a_file_that_opencv_reads() {
+    let run = run();
+    for (format, model) in [("open-vins-kalibr", "kalibr"), ("open-vins-rpng", "rpng")] {
+        let text = text_of(&record(), format, Some(&run)).0;
+        let texts = opencv(&text);
+        assert_eq!(
+            (texts["model"].as_str(), texts["rostopic"].as_str()),
+            (model, "/imu0")
         );
-        assert!(text.contains("turncal allan"));
+        let file = yaml(text.strip_prefix("%YAML:1.0").unwrap());
+        for (key, count) in [
+            ("gyroscope_noise_density", 1),
+            ("gyroscope_random_walk", 1),
+            ("accelerometer_noise_density", 1),
+            ("accelerometer_random_walk", 1),
+            ("Tw", 9),
+            ("Ta", 9),
+            ("R_IMUtoACC", 9),
+            ("R_IMUtoGYRO", 9),
+            ("Tg", 9),
+        ] {
+            let values = &file[&format!("imu0.{key}")];
+            assert_eq!(values.len(), count, "{key}");
+            assert!(count == 9 || values[0] > 0.0, "{key}");
+        }
+    }
+}
+
+/// Kalibr, `kalibr_common/ConfigReader.py`, `ImuParameters`: a topic, which is a text, and rate, noise densities and
+/// random walks above zero, as keys of the file itself.
+#[test]
+fn kalibr_reads_topic_rate_and_noise_of_one_imu_at_the_top_of_the_file() {
+    let text = text_of(&record(), "kalibr", Some(&run())).0;
+    assert!(text.contains("\nrostopic: \"/imu0\"\n"), "{text}");
+    let file = yaml(&text);
+    for key in [
+        "update_rate",
+        "accelerometer_noise_density",
+        "accelerometer_random_walk",
+        "gyroscope_noise_density",
+        "gyroscope_random_walk",
+    ] {
+        assert!(
+            matches!(file[key][..], [value] if value > 0.0),
+            "{key}: {text}"
+        );
+    }
+    // PyYAML reads a number as a text unless it has a point and its exponent a sign.
+    for number in text
+        .split_whitespace()
+        .filter(|word| word.parse::<f64>().is_ok())
+    {
+        let is_float = number.contains('.') && number.contains(['+', '-']);
+        assert!(is_float || !number.contains('e'), "{number}");
+    }
+}
+
+#[test]
+fn kalibr_measures_along_the_axes_of_the_log() {
+    let root = tempfile::tempdir().unwrap();
+    let rows: String = (0..400)
+        .map(|k| format!("{:?},0.01,0.02,0.03,0.1,0.2,-9.8\n", 0.01 * f64::from(k)))
+        .collect();
+    fs::write(
+        root.path().join("imu.csv"),
+        format!("t,p,q,r,a,b,c\n{rows}"),
+    )
+    .unwrap();
+    let toml = "format = \"turncal-run/1\"
+[site]
+latitude_deg = 48
+height_m = 200
+[imu]
+file = \"imu.csv\"
+output = \"rate\"
+gyro_unit = \"rad/s\"
+accel_unit = \"m/s^2\"
+body_axes = \"frd\"
+time_stamp = \"end\"
+columns = { time = \"t\", gyro = [\"p\", \"q\", \"r\"], accel = [\"a\", \"b\", \"c\"] }
+[imu.noise]
+angle_random_walk_deg_per_sqrt_h = 0.3
+velocity_random_walk_ug_per_sqrt_hz = 150.0
+";
+    fs::write(root.path().join("run.toml"), toml).unwrap();
+    let run = turncal_files::read_run(&root.path().join("run.toml")).unwrap();
+    let mut record = record();
+    record.unit = Some(run.instrument.unit.clone());
+    for (triad, scale) in [(&mut record.gyro, 2e6), (&mut record.accel, 1e5)] {
+        triad.scale = triad.scale.map(|of| of / scale);
+        triad.bias = triad.bias.map(|of| of / scale);
+    }
+    let text = text_of(&record, "kalibr", Some(&run)).0;
+    assert!(text.contains("along front, right, down"), "{text}");
+    let to_log = |v: Vector3<f64>| Vector3::new(v.y, v.x, -v.z);
+    for input in INPUTS {
+        let [rate, force] = halves(&input);
+        let raw = [output(&record.gyro, rate), output(&record.accel, force)].map(to_log);
+        let [gyro, accel] = kalibr_measures(&text, to_log(rate), to_log(force));
+        assert_near(gyro, raw[0]);
+        assert_near(accel, raw[1]);
+    }
+}
+
+/// A calibration whose report holds these figures in deg/√h, deg/h and µg/√Hz.
+fn with_noise(arw: [f64; 3], vrw: [f64; 3], bias: [f64; 3]) -> Calibration {
+    let source = |source: Source, [used, low, high]: [f64; 3]| SourceFigures {
+        source,
+        name: source.name().to_owned(),
+        unit: source.unit().0.to_owned(),
+        stated: None,
+        used,
+        interval: Some([low, high]),
+    };
+    let sources = vec![
+        source(Source::AngleRandomWalk, arw),
+        source(Source::VelocityRandomWalk, vrw),
+        source(Source::GyroGaussMarkov, bias),
+    ];
+    let report = NoiseReport {
+        policy: NoisePolicy::default(),
+        learnt: true,
+        test: None,
+        sources,
+    };
+    Calibration {
+        noise: Some(NoiseRecord {
+            report,
+            run_toml: None,
+        }),
+        ..record()
+    }
+}
+
+#[test]
+fn a_refuted_figure_gives_way_to_the_calibrations_and_one_that_agrees_stays() {
+    // The run states 2e-5 rad/√s, which is 0.069 °/√h, 5e-5 (m/s)/√s, which is 5.1 µg/√Hz, and 4e-7 rad/s.
+    let record = with_noise([0.3, 0.2, 0.4], [6.0, 5.0, 7.0], [2.0, 1.0, 3.0]);
+    let of = |format, run: Option<&Run>| yaml(&text_of(&record, format, run).0);
+    let near = |found: f64, expected: f64| {
+        assert!((found / expected - 1.0).abs() < 1e-12, "{found} {expected}");
+    };
+    let (run, arw, bias) = (run(), 0.3 * DEG_PER_SQRT_H, 2.0 * DEG_PER_H);
+    let file = of("kalibr", Some(&run));
+    near(file["gyroscope_noise_density"][0], arw);
+    near(file["accelerometer_noise_density"][0], 5e-5);
+    near(file["gyroscope_random_walk"][0], bias * 0.1);
+    near(of("kf-gins", Some(&run))["imunoise.arw"][0], 0.3);
+    let variance = of("ros-covariance", Some(&run));
+    near(
+        variance["angular_velocity_covariance"][0],
+        arw * arw * 128.0,
+    );
+    // Without a run, the calibration's figures are all there are.
+    let file = of("kalibr", None);
+    near(file["gyroscope_noise_density"][0], arw);
+    near(
+        file["accelerometer_noise_density"][0],
+        6.0 * MICRO_G_PER_SQRT_HZ,
+    );
+}
+
+#[test]
+fn the_user_learns_which_identities_px4_wants_and_which_trims_a_log_must_not_have() {
+    for (format, words) in [
+        ("px4", &["CAL_GYRO0_ID", "CAL_ACC0_ID", "device_id"][..]),
+        ("betaflight", &["recorded with acc_calibration = 0,0,0,0"]),
+        (
+            "inav",
+            &[
+                "recorded with acczero and gyro_zero = 0",
+                "accgain = 4096",
+                "init_gyro_cal = OFF",
+            ],
+        ),
+    ] {
+        let text = exported(&record(), format).0;
+        let comments: Vec<&str> = text.lines().filter(|line| line.starts_with('#')).collect();
+        for words in words {
+            assert!(
+                comments.iter().any(|line| line.contains(words)),
+                "{format}: {text}"
+            );
+        }
+    }
+}
+
+#[test]
+fn no_export_has_more_than_six_lines_of_comments() {
+    let mut record = with_terms(record());
+    for name in ["instrument", "serial", "notes", "operator"] {
+        record.meta.insert(name.to_owned(), "two\nlines".to_owned());
+    }
+    record.warnings = vec!["W07".to_owned(); 9];
+    let run = run();
+    for format in &FORMATS {
+        for run in [None, Some(&run)] {
+            let text = String::from_utf8_lossy(&bytes(&record, format.name, run).0).into_owned();
+            let lines = text.lines().map(str::trim_start);
+            let comments = lines.filter(|line| {
+                line.starts_with("//") || line.starts_with('#') && format.name != "c"
+            });
+            let count = comments.count();
+            let is_binary = ["mat", "realsense"].contains(&format.name);
+            assert!(
+                is_binary || (1..=6).contains(&count),
+                "{}: {text}",
+                format.name
+            );
+        }
     }
 }
 
@@ -507,8 +768,20 @@ fn what_a_format_does_not_hold_is_said_in_the_file_and_on_standard_error() {
     let root = tempfile::tempdir().unwrap();
     written(root.path(), "c.json", &with_terms(record()));
     for (format, lost) in [
-        ("kalibr", &["biases", "sigma", "accel-second-order"][..]),
-        ("kf-gins", &["misalignment", "sigma", "g-sensitivity"]),
+        (
+            "kalibr",
+            &[
+                "biases",
+                "rostopic",
+                "sigma",
+                "update_rate",
+                "accel-second-order",
+            ][..],
+        ),
+        (
+            "kf-gins",
+            &["misalignment", "sigma", "gsstd", "arw", "g-sensitivity"],
+        ),
         ("c", &["sigma", "accel-second-order, g-sensitivity"]),
         ("text", &["covariance"]),
     ] {
@@ -522,7 +795,10 @@ fn what_a_format_does_not_hold_is_said_in_the_file_and_on_standard_error() {
                 line.starts_with("not included: ") && line.contains(lost),
                 "{line}"
             );
-            assert!(file.contains(line), "{line}");
+            assert!(
+                file.contains(line.trim_start_matches("not included: ")),
+                "{line}"
+            );
         }
         let printed = turncal(&["c.json", "--format", format], root.path()).success();
         assert_eq!(printed.get_output().stdout, file.as_bytes());

@@ -502,3 +502,44 @@ fn what_is_rebuilt_calibrates_to_its_truth_from_the_log_alone() {
         assert_calibrates(&log, &further);
     }
 }
+
+/// Each of these was refused, or read without a column, before lines were told by their shape.
+#[test]
+fn lines_with_words_beside_their_numbers_calibrate_as_they_are() {
+    for (case, name, further) in [
+        ("c01-labels-equal-sign", "monitor.txt", &[][..]),
+        ("c06-razor-hash", "razor.txt", &["--rate", "25"]),
+        ("c07-putty-cut-first-row", "putty.csv", &[]),
+        ("c12-arduino-ide-arrow", "ide.txt", &[]),
+        ("c20-timetable-duration", "tt.csv", &[]),
+        ("c28-labview", "test.lvm", &[]),
+    ] {
+        let Some(log) = file(case, name) else {
+            continue;
+        };
+        let gravity = ["--gravity", "9.809"];
+        assert_calibrates(&log, &[&gravity, further].concat());
+    }
+}
+
+/// Words name values with their units; a sentence of a receiver has its values by number, without its check sum.
+#[test]
+fn words_name_columns_and_units() {
+    if let Some(log) = file("c01-labels-equal-sign", "monitor.txt") {
+        has(
+            &draft(&log),
+            &[
+                "columns = { time = \"1\", gyro = [\"Gyr x\", \"Gyr y\", \"Gyr z\"], accel = [\"Acc x\", ",
+                "time_unit = \"ms\"",
+                "gyro_unit = \"deg/s\"",
+                "accel_unit = \"g\"",
+            ],
+        );
+    }
+    if let Some(log) = file("c04-novatel-rawimusx", "span.asc") {
+        has(
+            &draft(&log),
+            &["columns = { time = \"2\", gyro = [\"11\", \"12\", \"13\"], accel = [\"8\", "],
+        );
+    }
+}

@@ -73,7 +73,7 @@ pub fn inputs(
         {
             let (name, expected) = (
                 sensor.name(),
-                format!("{own:?}, the unit of this calibration"),
+                format!("{own:?}, the unit of this calibration. Convert the columns."),
             );
             return Err(wrong(name, format_args!("the unit {unit:?}"), &expected));
         }

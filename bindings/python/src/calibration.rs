@@ -7,13 +7,14 @@ use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
 use pyo3::types::PyIterator;
 use turncal::calibration;
-use turncal::calibration::{Correction, Finding, FindingKind, Progress as Passes};
+use turncal::calibration::{Correction, Finding, Progress as Passes};
 use turncal::imu::{Output, Sensor, Term};
 use turncal::lot::{Lot, Specification, Unit};
 use turncal::study::CheckedCalibration;
 use turncal_files::{calibration_json, read_calibration, record_inputs, write_calibration};
 use turncal_report::calibration as of_calibration;
 use turncal_report::document::Table;
+use turncal_report::values::verdict;
 use turncal_report::{Document, at_rest, lot as of_lot, write};
 
 use crate::errors::{in_python, raise, raised};
@@ -168,27 +169,9 @@ impl Calibration {
 
     /// How many parameters were determined, and how many findings there are.
     fn summary(&self) -> String {
-        let (record, all) = (&self.record, self.record.parameters.len());
-        if record.verdict.is_none() {
-            return format!("{} values, not estimated", record.names().len());
-        }
-        let names = |of: &Finding, name: &str| {
-            let parameters = of.figures["parameters"].as_array();
-            parameters.is_some_and(|all| all.iter().any(|of| of == name))
-        };
-        let is_hidden = |name: &&String| {
-            let mut findings = record.findings.iter();
-            findings.any(|of| of.is(FindingKind::NotObserved) && names(of, name))
-        };
-        let hidden = record.parameters.iter().filter(is_hidden).count();
-        let findings = match record.findings.len() {
-            0 => "no findings".to_owned(),
-            1 => "one finding".to_owned(),
-            n => format!("{n} findings"),
-        };
-        format!(
-            "{} of {all} parameters determined, {findings}",
-            all - hidden
+        verdict(&self.record).map_or_else(
+            || format!("{} values, not estimated", self.record.names().len()),
+            |(_, words)| words,
         )
     }
 
@@ -205,7 +188,10 @@ impl Calibration {
             }
         };
         let values = self.values().into_iter();
-        let row = |(name, value, sigma, unit)| vec![name, digits(value, 7), digits(sigma, 3), unit];
+        let row = |(name, value, sigma, unit): (_, _, _, String)| {
+            let unit = unit.replace(' ', "\u{a0}");
+            vec![name, digits(value, 7), digits(sigma, 3), unit]
+        };
         let table = Table::new("Values", ["", "value", "1σ", "unit"]).section(values.map(row));
         document.page(table.note(EQUATION));
         Ok(document)
@@ -342,7 +328,7 @@ impl Calibration {
         values::matrices(py, &by.matrix)
     }
 
-    /// "good", "use with care" or "failed"; None for values that were not estimated.
+    /// "good", "use with care", "partial" (some of K, E and D were not determined) or "failed"; None for values that were not estimated.
     #[getter]
     fn verdict(&self) -> Option<String> {
         self.verdict_word()

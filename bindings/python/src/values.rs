@@ -61,8 +61,16 @@ pub fn html(calibration: &Calibration) -> String {
             let values = row(record.triad(sensor), axis);
             let sigmas = sigma.map_or([0.0; 5], |sigma| row(sigma, axis));
             let _ = write!(html, "<tr><th>{name}</th>");
-            for (value, sigma) in values.into_iter().zip(sigmas) {
-                let _ = write!(html, "<td>{}</td>", with_sigma(value, sigma));
+            let of = |kind| format!("{}.{kind}.{name}", sensor.name());
+            let misalignments = AXES.map(|to| format!("{}{to}", of("installation")));
+            let names = [of("scale"), of("bias")].into_iter().chain(misalignments);
+            for ((value, sigma), of) in values.into_iter().zip(sigmas).zip(names) {
+                // The prior of an undetermined parameter is no result.
+                let cell = match record.undetermined().any(|name| *name == of) {
+                    true => "–".to_owned(),
+                    false => with_sigma(value, sigma),
+                };
+                let _ = write!(html, "<td>{cell}</td>");
             }
             html += "</tr>";
         }
@@ -77,11 +85,11 @@ fn row(of: &TriadRecord, axis: usize) -> [f64; 5] {
     [of.scale[axis], of.bias[axis], x, y, z]
 }
 
-/// A value with the decimals that its σ determines.
+/// A value with the decimals that its σ determines, on one line.
 fn with_sigma(value: f64, sigma: f64) -> String {
     if sigma == 0.0 {
         return digits(value, 7);
     }
     let decimals = (1.0 - sigma.log10().floor()).max(0.0) as usize;
-    format!("{value:.decimals$} ± {sigma:.decimals$}")
+    format!("{value:.decimals$}\u{a0}±\u{a0}{sigma:.decimals$}")
 }

@@ -44,6 +44,13 @@ def test_arrays_are_calibrated_as_columns_are(frame, arrays, calibration):
     for wrong in [arrays["gyro"][:, :2], arrays["gyro"][:-1], arrays["gyro"].astype(str), arrays["gyro"].T]:
         with pytest.raises(turncal.Error, match="expected"):
             turncal.run(**{**arrays, "gyro": wrong}, time=t, **KNOWN)
+    rows, series = arrays["gyro"].tolist(), [frame[name] for name in GYRO]
+    for of in [{"gyro": rows}, {"gyro": [*zip(*rows)]}, {"gyro": series}, {"gyro": [*series, "rad/s"]}, {"time": t.tolist()}]:
+        with pytest.raises(turncal.Error, match="^(gyro|time): found a list of length .*numpy.asarray") as raised:
+            turncal.run(**{**arrays, "time": t, **of}, **KNOWN)
+        assert len(str(raised.value)) < 300
+    with pytest.raises(turncal.Error, match="'gx'|gx: found rows of different lengths"):
+        turncal.run({**frame, "gx": [[0.0], [0.0, 1.0]]}, **KNOWN)
 
 
 def test_the_equation_holds_for_arrays(arrays, frame, calibration):

@@ -2,9 +2,6 @@
 
 import subprocess
 import sys
-from pathlib import Path
-
-import turncal
 
 PROGRAM = '''
 import numpy as np
@@ -30,23 +27,23 @@ except turncal.Error as error:
 '''
 
 
-def mypy(path):
-    return subprocess.run([sys.executable, "-m", "mypy", "--strict", path], capture_output=True, text=True, cwd=path.parent)
+def mypy(directory, *of):
+    return subprocess.run([sys.executable, "-m", "mypy", "--strict", *of], capture_output=True, text=True, cwd=directory)
 
 
 def test_a_program_of_a_user_passes_mypy_strict(tmp_path):
     path = tmp_path / "program.py"
     path.write_text(PROGRAM)
-    done = mypy(path)
+    done = mypy(tmp_path, path)
     assert done.returncode == 0, done.stdout
 
 
-def test_the_package_passes_mypy_strict():
-    done = mypy(Path(turncal.__file__).parent)
+def test_the_package_passes_mypy_strict(tmp_path):
+    done = mypy(tmp_path, "-p", "turncal")
     assert done.returncode == 0, done.stdout
 
 
 def test_wrong_types_are_found(tmp_path):
     path = tmp_path / "wrong.py"
     path.write_text('import turncal\nturncal.read(7)\nturncal.simulate("demo").calibrate(methd="ekf")\n')
-    assert mypy(path).stdout.count("error:") == 2
+    assert mypy(tmp_path, path).stdout.count("error:") == 2

@@ -46,13 +46,13 @@ def columns(data: Data) -> Iterator[tuple[str, Any]]:
     found = f"an array of shape {data.shape}" if isinstance(data, np.ndarray) else type(data).__name__
     raise Error(
         f"data: found {found}, expected a DataFrame of pandas or polars, a Dataset of xarray, an array of shape "
-        "(rows, columns), or a mapping of arrays"
+        "(rows, columns), or a mapping of arrays. Convert rows with pandas.DataFrame; turncal.read reads a file."
     )
 
 
 def _split(name: str, of: Any) -> Iterator[tuple[str, Any]]:
     """A column, or the three columns of an array of shape (n, 3)."""
-    column = of if is_array(of) else np.asarray(of)
+    column = of if is_array(of) else _array(name, of)
     if column.shape[1:] != (3,):
         return iter([(name, column)])
     return ((f"{name}_{axis}", np.asarray(column)[:, place]) for place, axis in enumerate("xyz"))
@@ -115,12 +115,39 @@ def triad(name: str, columns: Columns | None) -> list[str] | None:
     """The names of three columns."""
     if columns is None:
         return None
-    if isinstance(columns, str) or not isinstance(columns, Sequence) or len(columns) not in (3, 4):
-        expected = "three columns, three columns and a unit, or an array of shape (n, 3)"
-        raise Error(f"{name}: found {columns!r}, expected {expected}")
+    if (
+        isinstance(columns, str)
+        or not isinstance(columns, Sequence)
+        or len(columns) not in (3, 4)
+        or not all(map(_is_name, columns[:3]))
+    ):
+        expected = "names of three columns, these and a unit, or an array of shape (n, 3)"
+        advice = "Convert rows with numpy.asarray, three columns with numpy.column_stack."
+        raise Error(f"{name}: found {_shown(columns)}, expected {expected}. {advice}")
     if any(isinstance(column, int) and column < 0 for column in columns[:3]):
         raise Error(f"{name}: found {columns!r}, expected numbers of columns from 0; '-1' is column 1 reversed")
     return [str(column) for column in columns[:3]]
+
+
+def single(name: str, column: Any) -> str | None:
+    """The name of a column."""
+    if column is not None and not _is_name(column):
+        expected = "the name of a column, or an array of shape (n,)"
+        raise Error(f"{name}: found {_shown(column)}, expected {expected}. Convert a list with numpy.asarray.")
+    return None if column is None else str(column)
+
+
+def _is_name(of: Any) -> bool:
+    """Levels of names are a tuple of texts in pandas."""
+    return isinstance(of, (str, int, np.integer)) or isinstance(of, tuple) and all(isinstance(n, str) for n in of)
+
+
+def _shown(of: Any) -> str:
+    """A wrong argument, of which a long one is described."""
+    text = repr(of)
+    if len(text) <= 80 or not isinstance(of, Sequence):
+        return text[:80]
+    return f"a {type(of).__name__} of length {len(of)} that begins with a {type(of[0]).__name__}"
 
 
 def unit(name: str, columns: Columns | None) -> str | None:
@@ -174,9 +201,16 @@ def numbers(column: Any) -> npt.NDArray[np.float64] | None:
     return np.ascontiguousarray(values, dtype=np.float64)
 
 
+def _array(name: str, of: Any) -> npt.NDArray[Any]:
+    try:
+        return np.asarray(of)
+    except ValueError:
+        raise Error(f"{name}: found rows of different lengths, expected numbers. Correct the rows.") from None
+
+
 def samples(name: str, of: Any) -> npt.NDArray[np.float64]:
     """Rows of three numbers, also one row."""
-    rows = np.atleast_2d(np.asarray(of))
+    rows = np.atleast_2d(_array(name, of))
     if rows.dtype.kind not in "iuf" or rows.shape[1:] != (3,):
         raise Error(f"{name}: found {_kind(rows)}, expected an array of shape (n, 3) or (3,) of numbers")
     return np.ascontiguousarray(rows, dtype=np.float64)

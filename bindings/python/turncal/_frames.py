@@ -17,6 +17,7 @@ from turncal._columns import (
     not_numbers,
     numbers,
     signed,
+    single,
     triad,
     unit,
     with_arrays,
@@ -110,8 +111,8 @@ def run(
     )
     of_table = {column: numbers(values) for column, values in table.items()}
     triads = [triad(sensor, named[sensor]) for sensor in ("gyro", "accel")]
-    single = [None if named[of] is None else str(named[of]) for of in ("time", "temperature")]
-    for column in [*(triads[0] or ()), *(triads[1] or ()), *(column for column in single if column is not None)]:
+    others = [single(of, named[of]) for of in ("time", "temperature")]
+    for column in [*(triads[0] or ()), *(triads[1] or ()), *(column for column in others if column is not None)]:
         bare, sign = signed(column, table)
         if bare in table:
             values = of_table[bare]
@@ -119,7 +120,7 @@ def run(
                 raise not_numbers(bare, table[bare])
             of_table[column] = sign * values
     columns_of_table = [(column, values) for column, values in of_table.items() if values is not None]
-    return _turncal.run(name, columns_of_table, triads[0], triads[1], single[0], single[1], known)
+    return _turncal.run(name, columns_of_table, triads[0], triads[1], others[0], others[1], known)
 
 
 def applied(
@@ -179,7 +180,7 @@ def _taken(table: dict[str, Any], names: list[str] | None) -> list[tuple[npt.NDA
         found = "found a calibration that names no columns of a table, expected those of gyros and accelerometers"
         raise Error(f"data: {found}. Name the columns with gyro= and accel=.")
     if missing:
-        found = f"found the columns {', '.join(table)}, expected {missing[0]!r} as in the calibrated log"
+        found = f"found the columns {', '.join(table) or 'none'}, expected {missing[0]!r} as in the calibrated log"
         raise Error(f"data: {found}. Name the columns with gyro= and accel=.")
     taken: list[tuple[npt.NDArray[Any], float]] = []
     for name, sign in inputs:

@@ -27,7 +27,7 @@ pub fn find(all: &[String], taken: &[usize], name: &str) -> Result<usize, [Strin
         [_] => Err([
             format!("the column `{name}` used for two quantities"),
             "a separate column for each".to_owned(),
-            "Correct `columns` in run.toml.".to_owned(),
+            "Name another column.".to_owned(),
         ]),
         [_, ..] => Err([
             format!("two columns named `{name}`"),

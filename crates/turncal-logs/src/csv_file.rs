@@ -5,6 +5,7 @@ mod heading;
 mod kind;
 mod lines;
 mod row;
+mod shape;
 
 use std::borrow::Cow;
 use std::fmt::Display;
@@ -17,9 +18,10 @@ use super::data_file::DataFile;
 use super::rows::Rows;
 use heading::{Heading, Looks};
 pub use kind::{RowKind, is_remark};
-use lines::{LONGEST, Lines, Stop};
+use lines::{LONGEST, Line, Lines, Stop};
 use row::{LONGEST_FIELD, MOST_COLUMNS, Malformed, Row};
-use turncal_input::{FileError, Place};
+use shape::{Added, Labelled, RARE, Sample, Stream};
+use turncal_input::{FileError, Place, counted, excerpt};
 
 /// First bytes of a gzipped file.
 const GZIP: [u8; 2] = [0x1f, 0x8b];
@@ -36,9 +38,38 @@ pub struct CsvFile {
     heading: Heading,
     /// Tag of the selected rows, and its column, for rows of several kinds.
     tag: Option<(usize, String)>,
+    /// Streams, selected stream and current sample, for rows with words next to their numbers.
+    labelled: Option<(Labelled, Stream, Sample)>,
     row: Row,
+    /// Numbers in the used columns of the row.
+    numbers: Vec<f64>,
     line: u64,
+    left_out: LeftOut,
     cut: Option<Cut>,
+}
+
+/// Lines among the rows that are not rows.
+#[derive(Debug, Default)]
+struct LeftOut {
+    /// Number of rows so far, and number of rows among the first lines.
+    rows: usize,
+    ahead: usize,
+    count: usize,
+    /// Number and text of the first such line.
+    first: Option<(u64, String)>,
+}
+
+impl LeftOut {
+    fn add(&mut self, line: &Line) {
+        self.count += 1;
+        let text = || excerpt(&String::from_utf8_lossy(&line.text));
+        self.first.get_or_insert_with(|| (line.number, text()));
+    }
+
+    /// Whether lines that are not rows are so few that the rows can be distinguished from them.
+    fn are_rare(&self) -> bool {
+        self.count * RARE <= self.rows.max(self.ahead)
+    }
 }
 
 /// Uncertainty at the end of a file without a line ending.
@@ -55,10 +86,24 @@ impl CsvFile {
     pub fn open(file: &DataFile, tag: Option<&str>) -> Result<Self, FileError> {
         let stopped = |stop: Stop| stopped(file, &stop);
         let mut lines = Lines::open(source(file)?).map_err(stopped)?;
-        if let Some(error) = not_rows(file, &lines) {
+        let labelled = Labelled::of(lines.ahead());
+        if let Some(error) = not_rows(file, &lines, labelled.is_some()) {
             return Err(error);
         }
-        let looks = Looks::of(lines.ahead());
+        let labelled = labelled.map(|of| {
+            let stream = of
+                .stream(tag)
+                .ok_or_else(|| no_tag(file, tag.unwrap_or_default()));
+            stream
+                .cloned()
+                .map(|stream| (of, stream, Sample::default()))
+        });
+        let labelled = labelled.transpose()?;
+        let looks = match &labelled {
+            Some((of, stream, _)) => Looks::of_stream(lines.ahead(), of, stream),
+            None => Looks::of(lines.ahead()),
+        };
+        let tag = tag.filter(|_| labelled.is_none());
         let tags = tag.map(|tag| {
             let tags = looks
                 .tags()
@@ -66,7 +111,9 @@ impl CsvFile {
             tags.ok_or_else(|| no_tag(file, tag))
         });
         let tags = tags.transpose()?;
-        let heading = looks.heading(tags.as_ref().zip(tag)).map_err(stopped)?;
+        let stream = labelled.as_ref().map(|(_, stream, _)| stream);
+        let heading = looks.heading(tags.as_ref().zip(tag), stream);
+        let heading = heading.map_err(stopped)?;
         let heading = heading.ok_or_else(|| {
             FileError::new(
                 file,
@@ -85,7 +132,13 @@ impl CsvFile {
                 .zip(tag)
                 .map(|(tags, tag)| (tags.column, tag.to_owned())),
             line: heading.line,
+            numbers: vec![f64::NAN; heading.names.len()],
+            left_out: LeftOut {
+                ahead: heading.rows,
+                ..LeftOut::default()
+            },
             heading,
+            labelled,
             cut: None,
         })
     }
@@ -93,9 +146,38 @@ impl CsvFile {
     /// Tags of rows of several kinds.
     pub fn tags(file: &DataFile) -> Result<Vec<String>, FileError> {
         let lines = Lines::open(source(file)?).map_err(|stop| stopped(file, &stop))?;
-        Ok(Looks::of(lines.ahead())
-            .tags()
-            .map_or_else(Vec::new, |tags| tags.names))
+        Ok(match Labelled::of(lines.ahead()) {
+            Some(labelled) => labelled.names(),
+            None => (Looks::of(lines.ahead()).tags()).map_or_else(Vec::new, |tags| tags.names),
+        })
+    }
+
+    /// Reads the numbers of these columns; false if a field of numbers has something else.
+    fn parse(&mut self, used: &[usize]) -> bool {
+        let mut are_numbers = true;
+        for &column in used {
+            let number = self.number(column);
+            if let Some(of_column) = self.numbers.get_mut(column) {
+                *of_column = number;
+            }
+            let is_number = self.heading.numbers.get(column) == Some(&true);
+            are_numbers &= !is_number || !number.is_nan() || self.is_blank(column);
+        }
+        are_numbers
+    }
+
+    /// The number in a column of the row; NaN if there is none.
+    fn number(&self, column: usize) -> f64 {
+        let text = std::str::from_utf8(self.bytes(column)).unwrap_or_default();
+        let clock = self.heading.clocks.get(column).copied().flatten();
+        let number = match (clock, text.parse()) {
+            (Some(clock), _) => clock.seconds(text),
+            (None, Err(_)) if self.heading.delimiter.leaves_commas() => {
+                text.replacen(',', ".", 1).parse().ok()
+            }
+            (None, number) => number.ok(),
+        };
+        number.unwrap_or(f64::NAN)
     }
 
     fn bytes(&self, column: usize) -> &[u8] {
@@ -108,10 +190,11 @@ impl CsvFile {
 }
 
 /// The error for a text whose first line shows another kind of file.
-fn not_rows(file: &DataFile, lines: &Lines) -> Option<FileError> {
+fn not_rows(file: &DataFile, lines: &Lines, is_labelled: bool) -> Option<FileError> {
     let first = lines.ahead().next()?.text.trim_ascii_start();
     let (found, advice) = match first.first()? {
-        b'{' => (
+        // Rows may be objects, one on each line.
+        b'{' if first.len() == 1 || !is_labelled => (
             "JSON",
             "Give a log. To show a calibration, run turncal show FILE.",
         ),
@@ -147,52 +230,67 @@ impl Rows for CsvFile {
 
     /// The result is also false at a truncated last row.
     fn advance(&mut self, used: &[usize]) -> Result<bool, FileError> {
-        let split = loop {
-            let more = self.lines.advance();
+        loop {
+            let more = self.lines.advance(self.labelled.is_some());
             if !more.map_err(|stop| stopped(&self.file, &stop))? {
                 return Ok(false);
             }
             let line = self.lines.line();
+            self.line = line.number;
+            if let Some((labelled, stream, sample)) = &mut self.labelled {
+                match sample.add(labelled, stream, &mut line.text) {
+                    Added::Complete => {}
+                    Added::Part => continue,
+                    Added::Nothing => {
+                        let is_row = labelled.knows(&line.text) || line.comment().is_some();
+                        if !is_row && self.left_out.rows > 0 && line.is_ended {
+                            self.left_out.add(line);
+                        }
+                        continue;
+                    }
+                }
+            }
             self.heading.delimiter.tidy(&mut line.text);
             let split = self.row.split(&line.text);
-            self.line = line.number;
             match &self.tag {
-                Some((column, tag)) if self.bytes(*column) != tag.as_bytes() => {}
-                _ => break split,
+                Some((column, tag)) if self.bytes(*column) != tag.as_bytes() => continue,
+                _ => {}
             }
-        };
-        let (found, expected) = (self.row.len(), self.header().len());
-        let is_cut = split == Err(Malformed::Quote) || found < expected;
-        if is_cut && !self.lines.is_ended() {
-            self.cut = Some(Cut::Row);
-            return Ok(false);
+            let (found, expected) = (self.row.len(), self.heading.names.len());
+            let is_cut = split == Err(Malformed::Quote) || found < expected;
+            if is_cut && !self.lines.is_ended() {
+                self.cut = Some(Cut::Row);
+                return Ok(false);
+            }
+            let ends_in_delimiter = found == expected + 1 && self.bytes(expected).is_empty();
+            let is_whole = split.is_ok() && (found == expected || ends_in_delimiter);
+            if is_whole && self.parse(used) {
+                self.left_out.rows += 1;
+                if !self.lines.is_ended() && used.contains(&(expected - 1)) && !ends_in_delimiter {
+                    self.cut = Some(Cut::Number);
+                }
+                return Ok(true);
+            }
+            self.left_out.add(self.lines.line());
+            if !self.left_out.are_rare() {
+                split.map_err(|what| malformed(&self.file, self.line, what))?;
+                if is_whole {
+                    return Ok(true);
+                }
+                return Err(self.error_here(
+                    format_args!("{found} fields"),
+                    format_args!("{expected} as in the header"),
+                    "Complete or remove the row.",
+                ));
+            }
         }
-        split.map_err(|what| malformed(&self.file, self.line, what))?;
-        let ends_in_delimiter = found == expected + 1 && self.bytes(expected).is_empty();
-        if found != expected && !ends_in_delimiter {
-            return Err(self.error_here(
-                format_args!("{found} fields"),
-                format_args!("{expected} as in the header"),
-                "Complete or remove the row.",
-            ));
-        }
-        if !self.lines.is_ended() && used.contains(&(expected - 1)) && !ends_in_delimiter {
-            self.cut = Some(Cut::Number);
-        }
-        Ok(true)
     }
 
     fn value(&self, column: usize) -> f64 {
-        let text = std::str::from_utf8(self.bytes(column)).unwrap_or_default();
-        let clock = self.heading.clocks.get(column).copied().flatten();
-        let number = match (clock, text.parse()) {
-            (Some(clock), _) => clock.seconds(text),
-            (None, Err(_)) if self.heading.delimiter.leaves_commas() => {
-                text.replacen(',', ".", 1).parse().ok()
-            }
-            (None, number) => number.ok(),
-        };
-        number.unwrap_or(f64::NAN)
+        match self.numbers.get(column) {
+            Some(number) if !number.is_nan() => *number,
+            _ => self.number(column),
+        }
     }
 
     fn shown(&self, column: usize) -> Cow<'_, str> {
@@ -221,6 +319,16 @@ impl Rows for CsvFile {
 
     fn may_be_cut(&self) -> bool {
         self.cut == Some(Cut::Number)
+    }
+
+    fn left_out(&self) -> Option<String> {
+        let (number, text) = self.left_out.first.as_ref()?;
+        let (file, count) = (self.file.display(), self.left_out.count);
+        Some(format!(
+            "{file}: turncal left out {} that {} no row like the others (line {number}: `{text}`).",
+            counted(count, "line"),
+            if count == 1 { "is" } else { "are" }
+        ))
     }
 
     fn cut_off(&self, done: &str) -> Option<String> {

@@ -69,6 +69,11 @@ pub trait Rows {
         false
     }
 
+    /// Remark on lines among the rows that are none.
+    fn left_out(&self) -> Option<String> {
+        None
+    }
+
     /// Remark on a truncated end of the file, with the treatment of its last row.
     fn cut_off(&self, _done: &str) -> Option<String> {
         None

@@ -65,11 +65,13 @@ fn findings(all: &[Finding], width: usize, room: usize) -> Vec<String> {
         let fits = lines.len() + more.len() + usize::from(!is_last) <= room;
         if place == 0 {
             // At least the problem is shown.
-            more.truncate(room.saturating_sub(usize::from(!is_last)).max(LINES));
+            let room = room.saturating_sub(usize::from(!is_last)).max(LINES);
+            more = at_most(room, more, width).collect();
         }
         if place == SHOWN || (place > 0 && !fits) {
-            let more = all.len() - place;
-            lines.push(format!("{CODE}and {more} more"));
+            let codes: Vec<&str> = all[place..].iter().map(|of| of.code.as_str()).collect();
+            let more = format!("{CODE}and {} more: {}", codes.len(), codes.join(", "));
+            lines.push(cut(&more, width));
             break;
         }
         lines.extend(more);

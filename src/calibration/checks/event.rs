@@ -213,9 +213,10 @@ impl EventKind {
                 (
                     Kind::BiasStep,
                     format!(
-                        "Before dwell {number} (at {time:.1} s) the {sensor} biases changed by about {size:.2} {name}. \
+                        "Before dwell {number} (at {time:.1} s) the {sensor} biases changed by about {} {name}. \
                          The calibration contains the mean bias over the recording. Check the log there for a shock or \
-                         a jump of temperature or supply"
+                         a jump of temperature or supply",
+                        three_digits(size)
                     ),
                 )
             }

@@ -6,6 +6,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::calibration::{Finding, FindingKind as Kind};
 use crate::imu::Sensor;
+use crate::number::three_digits;
 use crate::statistics::FALSE_ALARM;
 
 /// Kind of observation.
@@ -104,11 +105,22 @@ pub struct Nis {
 /// Selects the innovations that show a model error; returns their squares, with mean one if the σ are correct.
 type Squares = fn(&[&Innovation]) -> Vec<f64>;
 
-/// Innovations that are tested separately: text that follows the kind of observation, and their squares.
-const LOOKS: [(&str, &str, Squares); 3] = [
-    ("all", "", of_all),
-    (AFTER_MOVES, " first after each move", after_moves),
-    ("over-dwells", " summed over each dwell", over_dwells),
+/// Innovations that are tested separately: text that follows the kind of observation, the causes to check if the
+/// innovations are large, and their squares.
+const LOOKS: [(&str, &str, &str, Squares); 3] = [
+    ("all", "", "the white noise in [imu.noise]", of_all),
+    (
+        AFTER_MOVES,
+        " first after each move",
+        "the noise of moves and of the table position, the time stamps and --with time-offset",
+        after_moves,
+    ),
+    (
+        "over-dwells",
+        " summed over each dwell",
+        "the bias variation in [imu.noise], or add --temperature if biases follow the temperature",
+        over_dwells,
+    ),
 ];
 const AFTER_MOVES: &str = "after-moves";
 
@@ -144,8 +156,9 @@ pub fn inconsistent(innovations: &[Innovation], pulses: &[Observation]) -> Optio
     let kinds = kinds.iter().filter(|(_, of_kind)| !of_kind.is_empty());
     let chance = FALSE_ALARM / (kinds.clone().count() * LOOKS.len()) as f64;
     let (mut each, mut looks, mut largest) = (Vec::new(), Vec::new(), 0f64);
+    let mut causes = Vec::new();
     for (observation, of_kind) in kinds {
-        for (look, which, squares) in LOOKS {
+        for (look, which, cause, squares) in LOOKS {
             let squares = squares(of_kind);
             let count = squares.len();
             let nis = squares.iter().sum::<f64>() / count as f64;
@@ -161,8 +174,13 @@ pub fn inconsistent(innovations: &[Innovation], pulses: &[Observation]) -> Optio
             };
             if nis < low || nis > high {
                 largest = largest.max(nis);
-                let name = observation.name();
-                each.push(format!("{name}{which} {nis:.2} ({low:.2} to {high:.2})"));
+                let (name, root) = (observation.name(), three_digits(nis.sqrt()));
+                each.push(format!(
+                    "{name}{which} {root} (NIS {nis:.2}; {low:.2} to {high:.2})"
+                ));
+                if !causes.contains(&cause) {
+                    causes.push(cause);
+                }
                 looks.push(json!({
                     "observation": observation, "look": look, "nis": nis, "count": count, "limits": [low, high]
                 }));
@@ -170,10 +188,9 @@ pub fn inconsistent(innovations: &[Innovation], pulses: &[Observation]) -> Optio
         }
     }
     let text = format!(
-        "The filter is inconsistent: NIS is outside its 99.9 % interval for {}. Where to look: only after moves – \
-         table position, scale factor or timing; during dwells – bias drift (add --temperature if the drift follows \
-         the temperature); everywhere – the white noise stated in [imu.noise].",
-        each.join("; ")
+        "Residuals are not of the size that their σ predict. Relative to it they are: {}. Check {}.",
+        each.join("; "),
+        causes.join("; ")
     );
     let any = !looks.is_empty();
     any.then(|| {

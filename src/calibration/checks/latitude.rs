@@ -34,31 +34,61 @@ pub fn earth_rate(problem: &Problem, outcome: &Outcome) -> Option<Finding> {
     }
     let site = &problem.run().site;
     let sensed = site.earth_rate_n() + rate;
-    let fits = sensed.z.atan2(sensed.x.hypot(sensed.y));
-    let [fits_deg, stated] = [fits, site.latitude].map(|of| value(of / DEGREE, 1.0));
-    let mut text = format!(
-        "The gyros sense the Earth rate of latitude {fits_deg}°, but {stated}° is stated. turncal estimated Earth rate"
-    );
-    let off = by_gravity(site, fits);
+    let latitude = sensed.z.atan2(sensed.x.hypot(sensed.y));
+    // Earth rate to the east changes north; it gives no information on the latitude.
+    let north = rate.x.atan2(sensed.y);
+    let is_north = (latitude - site.latitude).abs() < north.abs();
+    let off = if is_north {
+        0.0
+    } else {
+        by_gravity(site, latitude)
+    };
     let sigmas = off / scale_sigma(outcome);
-    if off > 0.0 {
-        text += &format!(
-            ", but gravity of the wrong latitude makes accelerometer scale factors wrong by {} ppm ({} σ)",
-            three_digits(off / PPM),
-            three_digits(sigmas)
-        );
-    }
-    text += ". Check latitude_deg and the north and level of the table.";
+    let text = if is_north {
+        of_north(north)
+    } else {
+        of_latitude([latitude, site.latitude], (off, sigmas))
+    };
     let figures = json!({
         "deg_per_h": Vec::from_iter(rate.iter().map(|of| of / DEG_PER_H)), "present": 1.0 - absent,
-        "latitude_deg": fits / DEGREE, "scale_error_ppm": off / PPM
+        "latitude_deg": latitude / DEGREE, "north_deg": north / DEGREE, "scale_error_ppm": off / PPM
     });
     let finding = Finding::new(Kind::EarthRateWrong, text, figures);
     Some(if sigmas > USELESS {
         finding.at(Level::Failed)
+    } else if is_north {
+        finding.at(Level::Note)
     } else {
         finding
     })
+}
+
+fn of_north(north: f64) -> String {
+    format!(
+        "The north of the table is off by {}°: the gyros sense Earth rate {} of it. turncal estimated Earth rate, so \
+         K, E and D do not depend on it. Correct the azimuth of the table.",
+        value(north.abs() / DEGREE, 0.01),
+        if north > 0.0 { "east" } else { "west" }
+    )
+}
+
+/// Sensed and stated latitude; the error of the accelerometer scale factors due to gravity, and this error divided by
+/// its σ.
+fn of_latitude(latitudes: [f64; 2], (off, sigmas): (f64, f64)) -> String {
+    let [sensed, stated] = latitudes.map(|of| value(of / DEGREE, 1.0));
+    let gravity = if off > 0.0 {
+        format!(
+            ", but gravity of the wrong latitude makes accelerometer scale factors wrong by {} ppm ({} σ)",
+            three_digits(off / PPM),
+            three_digits(sigmas)
+        )
+    } else {
+        String::new()
+    };
+    format!(
+        "The gyros sense the Earth rate of latitude {sensed}°, but {stated}° is stated. turncal estimated Earth \
+         rate{gravity}. Check latitude_deg and the north and level of the table."
+    )
 }
 
 /// Relative error of gravity, if it was computed from the stated latitude but another latitude is right; zero if

@@ -17,7 +17,7 @@ pub mod settling;
 pub mod term;
 pub mod unexplained;
 
-use crate::calibration::{Outcome, Problem};
+use crate::calibration::{Level, Outcome, Problem};
 use event::Event;
 use finding::Finding;
 use term::TermEvidence;
@@ -35,25 +35,31 @@ pub fn findings(problem: &Problem, outcome: &Outcome) -> Vec<Finding> {
         Some(_) => None,
         None => unexplained::unexplained(&outcome.consistency.all, innovations),
     };
+    let of_noise = rest_scatter::scatter_at_rest(problem, &estimate.triads);
+    // If the stated noise is too small, noise appears as events, terms and innovations.
+    let by_noise = of_noise.iter().any(|finding| finding.level() > Level::Note);
+    let far = prior_distance::far_from_prior(&problem.model, estimate);
+    let not_observed = observability::not_observed_by_path(outcome, far.as_ref());
+    let of_fit = outcome.events.iter().map(Event::finding);
+    let of_fit = of_fit
+        .chain(settling::settles(problem, outcome))
+        .chain(TermEvidence::findings(&outcome.terms))
+        .filter(|_| !by_noise);
+    let inconsistent = innovation::inconsistent(innovations, &problem.with_pulses());
     let remarks = problem.remarks().into_iter();
     remarks
         .chain(unexplained::not_converged(outcome))
         .chain(unexplained::absurd(problem, outcome))
         .chain(latitude::earth_rate(problem, outcome))
-        .chain(outcome.events.iter().map(Event::finding))
-        .chain(settling::settles(problem, outcome))
-        .chain(TermEvidence::findings(&outcome.terms))
-        .chain(outcome.noise.finding(problem))
-        .chain(rest_scatter::scatter_at_rest(problem, &estimate.triads))
-        .chain(rounding::rounded(problem, &rounding, &estimate.covariance))
-        .chain(prior_distance::far_from_prior(&problem.model, estimate))
-        .chain(observability::not_observed_by_path(outcome))
+        .chain(far)
         .chain(form)
+        .chain(of_noise)
+        .chain(of_fit)
+        .chain(outcome.noise.finding(problem))
+        .chain(rounding::rounded(problem, &rounding, &estimate.covariance))
+        .chain(not_observed)
         .chain(unexplained)
-        .chain(innovation::inconsistent(
-            innovations,
-            &problem.with_pulses(),
-        ))
+        .chain(inconsistent.filter(|_| !by_noise))
         .chain(recordings::recordings_differ(&outcome.differences))
         .collect()
 }

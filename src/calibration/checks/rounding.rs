@@ -21,6 +21,8 @@ use crate::units::DEGREE;
 
 /// Number of summed waves; the others add a thousandth.
 const WAVES: u32 = 600;
+/// A variance of means, in (rad/s)² or (m/s²)², that no sensor shows: its square must not vanish in rounding.
+const NOTHING: f64 = f64::EPSILON * f64::EPSILON;
 /// Smallest growth of σ that is reported.
 const SAID: f64 = 1.05;
 
@@ -78,7 +80,8 @@ fn of_triad(
         .flat_map(|(recording, run)| of_recording(problem, recording, run, sensor))
         .collect();
     let variance = means.iter().map(|mean| mean.variance.mean()).sum::<f64>();
-    let variance = Some(variance / means.len() as f64).filter(|variance| *variance > 0.0)?;
+    let variance = variance / means.len() as f64;
+    let variance = Some(variance).filter(|variance| *variance > NOTHING)?;
     let along_gravity = sensor == Sensor::Accel && problem.model.aiding == Aiding::Velocity;
     let mut equations = Equations::of_triads(&problem.model, triads, &[sensor]);
     let mut numbers = BTreeMap::new();

@@ -1,13 +1,14 @@
 //! Evidence for error terms, and the findings on terms that are present and terms that a path does not show.
 
 use serde::{Deserialize, Serialize};
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::calibration::sizes::{Candidates, Weighed};
 use crate::calibration::{
     Candidate, ErrorTerm, Finding, FindingKind as Kind, Group, Model, OBSERVED_BELOW, PARAMETERS,
     Posterior,
 };
+use crate::number::three_digits;
 use crate::statistics::FALSE_ALARM;
 
 /// A term that a path does not show is reported if it increases the σ of a group by more than this factor.
@@ -81,41 +82,18 @@ impl TermEvidence {
         terms.collect()
     }
 
-    /// The findings on terms that were not requested.
+    /// The findings on terms that were not requested: one on terms that are present, one on terms that are not shown.
     pub(in crate::calibration) fn findings(all: &[Self]) -> Vec<Finding> {
-        all.iter().filter_map(Self::finding).collect()
-    }
-
-    fn finding(&self) -> Option<Finding> {
-        let Self {
-            term,
-            present,
-            remaining,
-            ..
-        } = self;
-        let name = term.name();
-        let figures = json!({ "term": name, "present": present, "remaining": remaining });
-        if *present == 1.0 {
-            return None;
-        }
-        if self.shown {
-            let text = format!(
-                "The data show an error that scale factors, misalignments and biases cannot explain: {name} \
-                 (probability above 99.9 %). turncal estimated this error too, as with --with {name}. Apply the \
-                 calibration with `turncal apply`; exports without this term leave its error in."
-            );
-            return Some(Finding::new(Kind::ErrorTermEstimated, text, figures));
-        }
-        let (group, factor) = self.widest()?;
-        if *remaining < OBSERVED_BELOW || factor < NAMED {
-            return None;
-        }
-        let (shown_by, group) = (term.shown_by(), group.title());
-        let text = format!(
-            "This recording does not show the possible error {name}. The σ of {group} are {factor:.2} times as large \
-             as without this term. Add {shown_by}; if it is absent, state [imu.terms] {name} = {{ sigma = 0 }}."
-        );
-        Some(Finding::new(Kind::TermNotShown, text, figures))
+        let candidates = all.iter().filter(|of| of.present < 1.0);
+        let (shown, others): (Vec<&Self>, Vec<&Self>) = candidates.partition(|of| of.shown);
+        let widens = |of: &&Self| {
+            of.remaining >= OBSERVED_BELOW && of.widest().is_some_and(|(_, factor)| factor >= NAMED)
+        };
+        let others: Vec<&Self> = others.into_iter().filter(widens).collect();
+        [estimated(&shown), not_shown(&others)]
+            .into_iter()
+            .flatten()
+            .collect()
     }
 
     /// The group whose σ the term increases most.
@@ -124,6 +102,51 @@ impl TermEvidence {
         let groups = groups.filter_map(|(group, factor)| Some((group, factor?)));
         groups.max_by(|a, b| a.1.total_cmp(&b.1))
     }
+}
+
+/// The finding on terms that the data show, if any. If two terms are alike, the data show one or the other.
+fn estimated(shown: &[&TermEvidence]) -> Option<Finding> {
+    let groups = shown.chunk_by(|one, other| one.term.alike() == other.term.alike());
+    let names = groups.map(|group| {
+        let names: Vec<&str> = group.iter().map(|of| of.term.name()).collect();
+        names.join(" or ")
+    });
+    let names: Vec<String> = names.collect();
+    let text = format!(
+        "The data show errors that scale factors, misalignments and biases cannot explain: {} (probability above \
+         99.9 %). turncal estimated these too, as with --with. Apply the calibration with `turncal apply`; exports \
+         without these terms leave their errors in.",
+        names.join(", ")
+    );
+    let finding = || Finding::new(Kind::ErrorTermEstimated, text, figures(shown));
+    (!shown.is_empty()).then(finding)
+}
+
+/// The finding on terms that the recording does not show but that increase σ, if any.
+fn not_shown(terms: &[&TermEvidence]) -> Option<Finding> {
+    let each = terms.iter().filter_map(|of| {
+        let (group, factor) = of.widest()?;
+        let (name, group, times) = (of.term.name(), group.title(), three_digits(factor));
+        Some(format!("{name} ({group}: {times} times)"))
+    });
+    let each: Vec<String> = each.collect();
+    let mut shown_by: Vec<&str> = terms.iter().map(|of| of.term.shown_by()).collect();
+    shown_by.sort_unstable();
+    shown_by.dedup();
+    let text = format!(
+        "This recording does not show these possible errors, which make σ larger: {}. Add {}, or use --with none \
+         if the sensor is known to have none of them.",
+        each.join(", "),
+        shown_by.join(", ")
+    );
+    (!terms.is_empty()).then(|| Finding::new(Kind::TermNotShown, text, figures(terms)))
+}
+
+fn figures(terms: &[&TermEvidence]) -> Value {
+    let each = terms.iter().map(
+        |of| json!({ "term": of.term.name(), "present": of.present, "remaining": of.remaining }),
+    );
+    json!({ "terms": each.collect::<Value>() })
 }
 
 /// σ of each group, divided by its σ if the constants at these positions were known.

@@ -34,7 +34,8 @@ pub fn not_converged(outcome: &Outcome) -> Option<Finding> {
          σ. Check scale, units and axes in run.toml with turncal check."
     );
     let figures = json!({ "passes": passes, "largest_step_sigma": step });
-    (!outcome.converged).then(|| Finding::new(Kind::NotConverged, text, figures))
+    let is_finite = outcome.estimate.covariance.iter().all(|of| of.is_finite());
+    (!outcome.converged || !is_finite).then(|| Finding::new(Kind::NotConverged, text, figures))
 }
 
 /// The finding, if residuals are too large for any sensor: in half of the dwells or moves they exceed a hundredth of

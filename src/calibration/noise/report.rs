@@ -171,16 +171,18 @@ fn noise_learnt(
         (is_sure && figures.used > NAMED * stated).then_some((words, (table, line)))
     });
     let (words, lines): (Vec<String>, Vec<(&str, String)>) = named.unzip();
-    let below = lines
-        .iter()
-        .map(|(table, line)| format!("[{table}] {line}"));
-    let below: Vec<String> = below.collect();
+    let tables = lines.chunk_by(|(one, _), (other, _)| one == other);
+    let tables = tables.map(|lines| {
+        let each: Vec<&str> = lines.iter().map(|(_, line)| line.as_str()).collect();
+        format!("in [{}]: {}", lines[0].0, each.join(", "))
+    });
+    let tables: Vec<String> = tables.collect();
     let lines: Vec<&String> = lines.iter().map(|(_, line)| line).collect();
     let text = format!(
         "Noise is larger than stated: {} (squared distance {ratio:.0}; limit {limit:.0}). turncal used its own \
-         estimate, and the σ include it. To state this estimate for the next recording, copy into run.toml: {}.",
+         estimate, and each σ includes it. To use this estimate for the next recording, state {}.",
         words.join("; "),
-        below.join(", ")
+        tables.join("; ")
     );
     let figures = json!({ "ratio": ratio, "limit": limit, "sources": sources, "lines": lines });
     Some(Finding::new(Kind::NoiseLearnt, text, figures))

@@ -23,7 +23,11 @@ pub struct Solution {
 }
 
 impl Equations {
-    /// Least-squares δθ with rows weighted by their variances; if it is not a number, an error that gives the triad.
+    /// Least-squares δθ with the prior and rows weighted by their variances, increased by the Birge ratio: if noise is
+    /// understated, rows must not move parameters that they hardly show far from the prior.
+    ///
+    /// # Errors
+    /// [`CalibrationError::Singular`] with the triad of an unknown that is not a number.
     pub fn step(&self) -> Result<ParameterVector, CalibrationError> {
         let Some(&first) = self.unknown.first() else {
             return Ok(ParameterVector::zeros());
@@ -31,18 +35,16 @@ impl Equations {
         let singular = |index: usize| CalibrationError::Singular {
             sensor: sensor_and_parameter(index).0,
         };
+        let factor = self.weighted_factor();
+        let step = |growth| {
+            let solved = self.with_prior(&factor, growth);
+            solved.map(|(step, _)| step).ok_or_else(|| singular(first))
+        };
         let (design, residual) = self.scaled();
-        let (count, unknown) = design.shape();
-        let mut all = DMatrix::from_diagonal(&self.sigma.map(f64::recip));
-        all = all.resize_vertically(unknown + count, 0.0);
-        all.rows_mut(unknown, count).copy_from(&design);
-        let qr = all.qr();
-        let gain = qr.r().solve_upper_triangular(&qr.q().transpose());
-        let gain = gain.ok_or_else(|| singular(first))?;
-        let of_prior = gain.columns(0, unknown).into_owned();
-        let of_rows = gain.columns(unknown, count).into_owned();
-        let step = of_prior * &self.mean + of_rows * residual;
-        let step = self.expanded(&DMatrix::from_column_slice(unknown, 1, step.as_slice()));
+        let left = residual - design * step(1.0)?;
+        let degrees = left.len().saturating_sub(self.unknown.len()).max(1);
+        let growth = (left.norm_squared() / degrees as f64).sqrt().max(1.0);
+        let step = self.expanded(&step(growth)?);
         let lost = step.iter().position(|value| !value.is_finite());
         lost.map_or(Ok(step), |index| Err(singular(index)))
     }

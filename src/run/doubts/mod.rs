@@ -6,6 +6,7 @@ mod quaternions;
 
 use super::Run;
 use crate::earth::{ANOMALY_SIGMA, normal_gravity};
+use crate::number::value;
 use crate::recording::nanoseconds;
 use crate::statistics::{FALSE_ALARM, chi_square_limit};
 use crate::units::{DEGREE, MILLIGAL};
@@ -38,13 +39,13 @@ fn gravity(run: &Run) -> Option<String> {
     let limit = chi_square_limit(1.0, FALSE_ALARM).sqrt() * sigma;
     (site.is_known && off.abs() > limit).then(|| {
         format!(
-            "gravity_m_s2 = {} is {:.0} mGal {} normal gravity at latitude {:.4}°, height {:.0} m (limit {:.0} mGal, \
+            "gravity_m_s2 = {} is {:.0} mGal {} normal gravity at latitude {}°, height {:.0} m (limit {:.0} mGal, \
              false-alarm rate 0.1 %). This difference goes directly into the accelerometer scale factors. Check \
              gravity_m_s2, latitude_deg and height_m.",
-            site.gravity,
+            value(site.gravity, 1e-4),
             off.abs() / MILLIGAL,
             if off > 0.0 { "above" } else { "below" },
-            site.latitude / DEGREE,
+            value(site.latitude / DEGREE, 0.1),
             site.height,
             limit / MILLIGAL
         )

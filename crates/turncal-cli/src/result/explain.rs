@@ -34,9 +34,11 @@ impl Explain {
             );
         };
         let verdict = match kind.level() {
-            Level::Failed => "The verdict is FAILED.",
-            Level::Partial => "The verdict is PARTIAL.",
-            Level::Care => "The verdict is USE WITH CARE.",
+            Level::Failed => "The verdict is then FAILED.",
+            Level::Partial => "The verdict is then PARTIAL, or as the finding says.",
+            Level::Care => {
+                "The verdict is then USE WITH CARE, unless the finding hardly changes the result."
+            }
             Level::Note => "The verdict is not affected.",
         };
         let mut document = Document::new(format!("{}  {}", kind.code(), kind.name()));

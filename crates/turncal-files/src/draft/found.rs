@@ -54,11 +54,17 @@ impl Draft {
         let is_zero = |motion: &Motion| motion.gravity == 0.0;
         let has_accels =
             self.columns.triads.accel.is_some() && !self.motion.as_ref().is_some_and(is_zero);
+        let why = match &*field {
+            "gyro_unit" if !has_accels => {
+                "no columns were recognised as accelerometers that measure gravity".to_owned()
+            }
+            _ => why,
+        };
         let (what, advice) = match &*field {
             "gyro_unit" if !has_accels => (
                 "the unit of the gyros",
-                "Give gyros and accelerometers: `turncal init GYROS ACCELS -o run.toml`. For an Allan analysis of the \
-                 gyros alone, add --gyro-unit.",
+                "Rename the columns of the accelerometers to ax, ay, az, or give both logs: `turncal init GYROS ACCELS \
+                 -o run.toml`. For an Allan analysis of the gyros alone, add --gyro-unit.",
             ),
             "gyro_unit" => (
                 "the unit of the gyros",
@@ -108,7 +114,10 @@ impl Draft {
                 clock.certainty,
             ),
             (None, Some(rate)) => (hertz(rate), clock.certainty),
-            (_, None) => ("sample period".to_owned(), Certainty::Unknown),
+            (_, None) => {
+                let why = format!("{}; set --rate", clock.why);
+                return Found::new("time", "sample period", Certainty::Unknown, why);
+            }
         };
         Found::new("time", value, certainty, &clock.why)
     }

@@ -2,7 +2,6 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::notation::list;
 use super::values::{Normalised, Values};
 use turncal::imu::{PerSensor, Sensor};
 use turncal::units::{ARCSEC, DEGREE, PPM, STANDARD_GRAVITY};
@@ -87,19 +86,6 @@ impl Residual {
             scale / PPM,
             across.amax() / ARCSEC
         )
-    }
-
-    /// All figures, one line per axis: fractions of u, and the constant in rad/s or m/s².
-    pub fn lines(&self) -> [String; 3] {
-        [0, 1, 2].map(|axis| {
-            format!(
-                "left, {} {}: {} of u and {}",
-                self.sensor.name(),
-                turncal::imu::AXES[axis],
-                list(self.errors.row(axis).iter()),
-                list(&[self.constant[axis]])
-            )
-        })
     }
 }
 

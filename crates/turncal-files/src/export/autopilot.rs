@@ -6,7 +6,8 @@
 //! Source: PX4-Autopilot, `src/lib/sensor_calibration` and `src/modules/temperature_compensation`; ArduPilot,
 //! `AP_InertialSensor_Backend.cpp`, `_rotate_and_correct_accel`, and `AP_InertialSensor_tempcal.cpp`, `correct_sensor`;
 //! Betaflight, `acceleration.c`, `applyAccelerationTrims`; INAV, `acceleration.c`, `applyAccelerationZero`, and
-//! `gyro.c`, `gyro_zero_x`.
+//! `gyro.c`, `gyro_zero_x`. PX4 skips thermal parameters whose `TC_G0_ID`, `TC_A0_ID` is not the device's:
+//! `TemperatureCompensation::set_sensor_id`.
 
 use nalgebra::Vector3;
 
@@ -62,11 +63,18 @@ fn px4_lines(parameters: Parameters) -> String {
 /// PX4's temperature: `n − (X0 + X1 d + X2 d² + X3 d³)`, d = T − TREF, before `CAL_*` are applied.
 pub fn px4(values: &Values) -> Exported {
     let program = single(values);
-    let id = "device identity: PX4 uses the parameters whose CAL_ACC0_ID and CAL_GYRO0_ID match the device; rename \
-        them for an instrument other than number 0";
     let names = ["CAL_GYRO0_#OFF", "CAL_ACC0_#OFF", "CAL_ACC0_#SCALE"];
     let mut text = px4_lines(parameters(&program, names));
+    // PX4 compares the identities with those of its drivers, which no log of samples holds.
     let thermal = values.record.temperature.iter();
+    let ids = match &values.record.temperature {
+        None => "CAL_GYRO0_ID and CAL_ACC0_ID: set them to the device_id",
+        Some(_) => "CAL_GYRO0_ID = TC_G0_ID and CAL_ACC0_ID = TC_A0_ID: set them to the device_id",
+    };
+    let ids = format!(
+        "{ids} that `listener sensor_gyro` and `listener sensor_accel` show; PX4 ignores the other parameters without \
+         them"
+    );
     for (thermal, sensor) in thermal.flat_map(|thermal| Sensor::ALL.map(|sensor| (thermal, sensor)))
     {
         let range = thermal.range.get(sensor);
@@ -86,7 +94,7 @@ pub fn px4(values: &Values) -> Exported {
         text += &format!("1\t1\t{all}_ENABLE\t1\t6\n");
     }
     let reads = ("#", "PX4 reads rad/s and m/s^2");
-    Remarks::of_program(values, reads, &program, &[UNCORRECTED, id]).above(&text)
+    Remarks::of_program(values, reads, &program, &[UNCORRECTED, &ids]).above(&text)
 }
 
 /// ArduPilot's temperature: `n − p(T) + p(T_cal)` before the offsets are subtracted, with `p(T) = (c₁ d + c₂ d² + c₃
@@ -149,10 +157,13 @@ pub fn betaflight(values: &Values) -> Exported {
         accel: Affine::offset(zero / per_unit),
     };
     let notes = ["all gyro parameters, because it zeroes the gyros at every start"];
-    let reads = ("#", "commands for its command line,");
+    let reads = ("#", "commands for its command line, from rad/s and m/s^2");
     let [x, y, z] = [zero.x, zero.y, zero.z].map(|count| count as i64);
     Remarks::of_program(values, reads, &program, &notes)
-        .defines([of_counts("an accelerometer", COUNTS_PER_G, "g")])
+        .defines([
+            of_counts("an accelerometer", COUNTS_PER_G, "g"),
+            "for a log recorded with acc_calibration = 0,0,0,0: Betaflight subtracts it before it logs".to_owned(),
+        ])
         .above(&format!("set acc_calibration = {x},{y},{z},1\nsave\n"))
 }
 
@@ -178,11 +189,14 @@ pub fn inav(values: &Values) -> Exported {
         ("gyro_zero", &gyro_zero),
     ];
     let text = all.map(|(name, values)| set(name, values)).concat();
-    let reads = ("#", "commands for its command line,");
+    let reads = ("#", "commands for its command line, from rad/s and m/s^2");
     Remarks::of_program(values, reads, &program, &[UNCORRECTED])
         .defines([
             of_counts("an accelerometer", COUNTS_PER_G, "g"),
             of_counts("gyros", COUNTS_PER_RAD_S, "rad/s"),
+            "for a log recorded with acczero and gyro_zero = 0, accgain = 4096 and init_gyro_cal = OFF: INAV applies \
+             them before it logs"
+                .to_owned(),
         ])
         .above(&(text + "set init_gyro_cal = OFF\nsave\n"))
 }

@@ -1,8 +1,9 @@
 //! A C99 header, without dependencies: constants and functions.
 
-use super::notation::{comment, numbers};
-use super::remarks::{Exported, Remarks, SIGMA};
+use super::notation::numbers;
+use super::remarks::{Exported, Remarks, SIGMA, equation};
 use super::values::Values;
+use turncal::calibration::ThermalRecord;
 use turncal::imu::{AXES, InstallationForm, Sensor};
 
 /// `turncal_calibrate`.
@@ -16,57 +17,86 @@ pub fn write(values: &Values) -> Exported {
 #ifndef TURNCAL_CALIBRATION_H
 #define TURNCAL_CALIBRATION_H
 
-{}// raw: N, gyros x y z, accelerometers x y z; calibrated: u in rad/s and m/s^2; they may be the same array
-{FUNCTION}
-{}#endif
+{}{FUNCTION}
+{}{}#endif
 ",
         Sensor::ALL.map(|sensor| constants(values, sensor)).concat(),
-        at_temperature(values)
+        at_temperature(values),
+        test_vectors(values)
     );
+    let functions = "raw: N, gyros x y z, accelerometers x y z; calibrated: u in the same order; they may be the same \
+        array; each test vector holds raw, then calibrated";
     Remarks::new(values, "//", &[SIGMA])
-        .with_test_vectors()
+        .defines(equation(values))
+        .defines([functions.to_owned()])
+        .defines(polynomial_words(values))
         .above(&text)
 }
 
+/// Raw outputs with their calibrated values, for a program that asks for them.
+fn test_vectors(values: &Values) -> String {
+    let vectors = values.record.test_vectors.iter();
+    let rows = vectors.map(|v| format!("    {{{}}}", numbers(v.raw.iter().chain(&v.calibrated))));
+    let rows: Vec<String> = rows.collect();
+    match rows.len() {
+        0 => String::new(),
+        count => format!(
+            "#ifdef TURNCAL_TEST_VECTORS\nstatic const double turncal_test_vectors[{count}][12] = \
+             {{\n{}\n}};\n#endif\n\n",
+            rows.join(",\n")
+        ),
+    }
+}
+
 fn constants(values: &Values, sensor: Sensor) -> String {
-    let (name, unit, input) = (sensor.name(), values.unit(sensor), Values::input(sensor));
+    let name = sensor.name();
     let matrix = values.correction.matrix.get(sensor);
     format!(
         "\
-{}static const double turncal_{name}_correction[3][3] = {{
+static const double turncal_{name}_correction[3][3] = {{
 {}
 }};
-{}static const double turncal_{name}_bias[3] = {{{}}};
+static const double turncal_{name}_bias[3] = {{{}}};
 
 ",
-        comment(
-            "//",
-            &format!("{input} along each axis per {unit} of each output")
-        ),
         [0, 1, 2]
             .map(|i| format!("    {{{}}}", numbers(matrix.row(i).iter())))
             .join(",\n"),
-        comment("//", &unit),
         numbers(values.correction.bias.get(sensor))
     )
 }
 
-/// Polynomials in temperature and the function that evaluates them, if the record has them.
-fn at_temperature(values: &Values) -> String {
+/// Temperature dependence, if the header can evaluate it.
+fn temperature<'a>(values: &'a Values) -> Option<&'a ThermalRecord> {
     let form = values.record.installation_form.unwrap_or_default();
-    if values.record.temperature.is_none() || form != InstallationForm::General {
-        return String::new();
-    }
-    let note = "the same at a constant temperature in degC; include <math.h> first";
-    let polynomials = Sensor::ALL.map(|sensor| polynomials(values, sensor));
-    polynomials.concat() + &comment("//", note) + AT_TEMPERATURE + "\n"
+    let thermal = values.record.temperature.as_ref();
+    thermal.filter(|_| form == InstallationForm::General)
 }
 
-fn polynomials(values: &Values, sensor: Sensor) -> String {
-    let Some(thermal) = &values.record.temperature else {
+fn polynomial_words(values: &Values) -> Option<String> {
+    let thermal = temperature(values)?;
+    let [gyro, accel] = Sensor::ALL.map(|sensor| {
+        let range = thermal.range.get(sensor);
+        format!("{} to {} degC", range.lowest, range.highest)
+    });
+    Some(format!(
+        "turncal_calibrate_at, at a constant temperature in degC: include <math.h> first; rows of ..._of_t: value at the \
+         reference temperature, then coefficients of powers 1 to 5; valid for {gyro} (gyros), {accel} (accelerometers)"
+    ))
+}
+
+/// Polynomials in temperature and the function that evaluates them, if the record has them.
+fn at_temperature(values: &Values) -> String {
+    let Some(thermal) = temperature(values) else {
         return String::new();
     };
-    let (name, range) = (sensor.name(), thermal.range.get(sensor));
+    let polynomials = Sensor::ALL.map(|sensor| polynomials(values, thermal, sensor));
+    polynomials.concat() + AT_TEMPERATURE + "\n"
+}
+
+fn polynomials(values: &Values, thermal: &ThermalRecord, sensor: Sensor) -> String {
+    let name = sensor.name();
+    let reference = thermal.range.get(sensor).reference;
     let triad = values.record.triad(sensor);
     let row = |(value, parameter): (f64, String)| {
         let powers = thermal.powers.get(&format!("{name}.{parameter}"));
@@ -90,12 +120,8 @@ fn polynomials(values: &Values, sensor: Sensor) -> String {
         let name = format!("installation.{}{}", AXES[i], AXES[j]);
         (triad.installation[i][j], name)
     };
-    let (reference, lowest, highest) = (range.reference, range.lowest, range.highest);
     [
-        format!(
-            "// {name}: value at {reference} degC, then coefficients of powers 1 to 5 of T - {reference}; valid from \
-             {lowest} to {highest} degC\nstatic const double turncal_{name}_reference_degc = {reference:e};\n"
-        ),
+        format!("static const double turncal_{name}_reference_degc = {reference:e};\n"),
         of_axes("scale", triad.scale),
         of_axes("bias", triad.bias),
         table("installation", places.map(entry).collect()),

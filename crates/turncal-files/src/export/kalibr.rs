@@ -1,7 +1,9 @@
-//! IMU intrinsics for Kalibr, model `scale-misalignment`, and for OpenVINS.
+//! IMU configuration for Kalibr, with intrinsics of its model `scale-misalignment`, and for OpenVINS.
 //!
 //! Source: Rehder et al., "Extending kalibr: calibrating the extrinsics of multiple IMUs and of individual axes", ICRA
-//! 2016; OpenVINS, `VioManagerOptions::print_and_load_state` and `Propagator::predict_and_compute`.
+//! 2016; Kalibr, `kalibr_common/ConfigReader.py`, `ImuParameters`, and `IccSensors.py`, `IccScaledMisalignedImu`;
+//! OpenVINS, `VioManagerOptions::print_and_load_noise` and `print_and_load_state`, `StateOptions::print`,
+//! `Propagator::predict_and_compute`, and `YamlParser::parse_external`, which reads by `cv::FileStorage`.
 
 use nalgebra::Matrix3;
 
@@ -15,6 +17,7 @@ use turncal::units::ARCSEC;
 /// Quantities that Kalibr and OpenVINS estimate themselves.
 const BIASES: &str =
     "biases, which it estimates itself, so they leave no error; a comment lists them";
+const TOPIC: &str = "rostopic of your recording, which you must write in place of /imu0";
 
 /// From true to measured, in rad/s and m/s²: `a = M_a C_i_b f + b_a`,
 /// `ω = M_g C_gyro_i C_i_b ω_b + A C_gyro_i C_i_b f + b_g`, with both `M` lower triangular and both `C` rotations.
@@ -25,63 +28,73 @@ pub fn kalibr(values: &Values) -> Exported {
     let (m_accel, imu_b) = lower(&accel.sensitivity);
     let (m_gyro, gyro_imu) = lower(&(gyro.sensitivity * imu_b.transpose()));
     let of_force = gyro.sensitivity * values.g_sensitivity * (gyro_imu * imu_b).transpose();
-    let remarks = with_biases(values, "Kalibr");
+    let (required, remarks) = configuration(values, "Kalibr", "");
     let text = format!(
         "\
-# measured = M C_i_b f + bias
-# measured = M C_gyro_i C_i_b w + A C_gyro_i C_i_b f + bias
-# T_i_b rotates the body frame above into the accelerometer axes, {:.1} arcsec away; a program that assumes the \
-identity gets u along those axes
-{}imu0:
-  model: scale-misalignment
-  T_i_b:{}
-  time_offset: 0.0
-  gyroscopes:
-    M:{}
-    A:{}
-    C_gyro_i:{}
-  accelerometers:
-    M:{}
-{}",
-        turncal::attitude::log(&imu_b).norm() / ARCSEC,
-        biases(values),
+{required}model: scale-misalignment
+T_i_b:{}
+time_offset: 0.0
+gyroscopes:
+  M:{}
+  A:{}
+  C_gyro_i:{}
+accelerometers:
+  M:{}
+",
         rows(2, &imu_b.to_homogeneous()),
         rows(4, &m_gyro),
         rows(4, &of_force),
         rows(4, &gyro_imu),
-        rows(4, &m_accel),
-        noise(values)
+        rows(4, &m_accel)
     );
-    remarks.above(&text)
+    let equations = "accelerometers measure M C_i_b f + bias, gyroscopes M C_gyro_i C_i_b w + A C_gyro_i C_i_b f + bias; \
+        Kalibr reads the first six keys only and starts from M = 1, A = 0, so give it the output of `turncal apply`";
+    let frame = format!(
+        "T_i_b rotates the body frame into the accelerometer axes, {:.1} arcsec away; a program that assumes the \
+         identity gets u along those axes",
+        turncal::attitude::log(&imu_b).norm() / ARCSEC
+    );
+    remarks.defines([equations.to_owned(), frame]).above(&text)
 }
 
-fn with_biases<'a>(values: &'a Values, program: &str) -> Remarks<'a> {
-    Remarks::new(values, "#", &[BIASES, SIGMA])
-        .including(|term| term == Term::GSensitivity)
-        .reads(&format!("{program} reads rad/s and m/s^2, here"))
-}
-
-fn biases(values: &Values) -> String {
-    let [gyro, accel] = Sensor::ALL.map(|sensor| list(&values.triads.get(sensor).bias));
-    format!("# bias of gyroscopes: {gyro}\n# bias of accelerometers: {accel}\n")
-}
-
-fn noise(values: &Values) -> String {
-    let key = |name: &str, value: Option<f64>, unit: &str| match value {
-        Some(value) => format!("  {name}: {}  # {unit}\n", number(value)),
-        None => format!("  # {name}:   # {unit}: {}\n", values.no_noise()),
+/// Topic, rate and noise (required by both programs), each on a line after `indent`, and comments.
+fn configuration<'a>(values: &'a Values<'a>, program: &str, indent: &str) -> (String, Remarks<'a>) {
+    // cv::FileStorage treats a comment after an unquoted text as part of the text.
+    let mut text = format!("{indent}rostopic: \"/imu0\"\n");
+    let mut missing = Vec::new();
+    let mut key = |name: String, value: Option<f64>, unit: &str| match value {
+        Some(value) => text += &format!("{indent}{name}: {}  # {unit}\n", number(value)),
+        None => missing.push(name),
     };
-    let triad = |sensor, name: &str| {
+    key("update_rate".to_owned(), values.rate, "Hz");
+    for (sensor, name) in [
+        (Sensor::Accel, "accelerometer"),
+        (Sensor::Gyro, "gyroscope"),
+    ] {
         let (triad, unit) = (values.triads.get(sensor), Values::input(sensor));
-        let walk = triad.varying().map(|bias| bias.walk());
-        let key = |what: &str, value, unit: String| key(&format!("{name}_{what}"), value, &unit);
-        key("noise_density", triad.density(), format!("{unit}/sqrt(Hz)"))
-            + &key("random_walk", walk, format!("{unit}/s/sqrt(Hz)"))
-    };
-    triad(Sensor::Gyro, "gyroscope")
-        + &triad(Sensor::Accel, "accelerometer")
-        + &key("update_rate", values.period.map(f64::recip), "Hz")
-        + "  # rostopic: /imu0  # the topic of your recording\n"
+        let density = format!("{unit}/sqrt(Hz)");
+        key(format!("{name}_noise_density"), triad.density(), &density);
+        let (walk, is_usual) = triad.varying().unzip();
+        let usual = match is_usual {
+            Some(true) => ", usual for this noise density; measure it with `turncal allan`",
+            _ => "",
+        };
+        let unit = format!("{unit}/s/sqrt(Hz){usual}");
+        key(
+            format!("{name}_random_walk"),
+            walk.map(|bias| bias.walk()),
+            &unit,
+        );
+    }
+    let [gyro, accel] = Sensor::ALL.map(|sensor| list(&values.triads.get(sensor).bias));
+    let remarks = Remarks::new(values, "#", &[BIASES, TOPIC, SIGMA])
+        .including(|term| term == Term::GSensitivity)
+        .omitting(Values::missing(&missing, program))
+        .reads(&format!("{program} reads rad/s and m/s^2"))
+        .defines([format!(
+            "bias of gyroscopes: {gyro}, of accelerometers: {accel}"
+        )]);
+    (text, remarks)
 }
 
 /// A triangle and the rotation before it: `A = triangle · rotation`.
@@ -121,27 +134,25 @@ fn open_vins(values: &Values, model: &str, split: fn(&Matrix3<f64>) -> Split) ->
     let gyro = &values.triads.gyro.sensitivity;
     let ((tw, imu_to_gyro), (ta, imu_to_acc)) =
         (split(gyro), split(&values.triads.accel.sensitivity));
-    let remarks = with_biases(values, "OpenVINS");
+    let (required, remarks) = configuration(values, "OpenVINS", "  ");
     let text = format!(
         "\
 %YAML:1.0
-{}# set imu_intrinsics_model: \"{model}\" in its estimator_config.yaml
 {}imu0:
+  model: \"{model}\"
+{required}  time_offset: 0.0
   Tw:{}
   R_IMUtoGYRO:{}
   Ta:{}
   R_IMUtoACC:{}
   Tg:{}
-  time_offset: 0.0
-{}",
+",
         remarks.text(),
-        biases(values),
-        rows(2, &tw),
-        rows(2, &imu_to_gyro),
-        rows(2, &ta),
-        rows(2, &imu_to_acc),
-        rows(2, &(gyro * values.g_sensitivity)),
-        noise(values)
+        rows(4, &tw),
+        rows(4, &imu_to_gyro),
+        rows(4, &ta),
+        rows(4, &imu_to_acc),
+        rows(4, &(gyro * values.g_sensitivity))
     );
     remarks.of_file(text.into_bytes())
 }

@@ -26,95 +26,98 @@ pub fn write(values: &Values) -> Exported {
         let tilt = misalignment.get(sensor).amax();
         format!("{:.1} arcsec ({:.1} ppm)", tilt / ARCSEC, tilt / PPM)
     });
-    let omissions: [&str; 2] = [
+    let omissions: [&str; 3] = [
         &format!(
             "misalignment: up to {gyros} (gyros) and {accelerometers} (accelerometers) remain in the data; if that is \
              too much, give KF-GINS the output of `turncal apply` with zero bias and scale"
         ),
         "sigma of misalignment, and covariance; they are in calibration.json",
+        "gsstd and asstd of imunoise, which KF-GINS requires: variation of scale factors in ppm, from the data sheet",
     ];
-    let lost = Sensor::ALL.into_iter().flat_map(|sensor| {
-        let rows = misalignment.get(sensor).row_iter();
-        rows.zip(["front", "right", "down"])
-            .map(move |(row, axis)| {
-                let [x, y, z] = [row[0], row[1], row[2]].map(|part| part / ARCSEC);
-                let name = sensor.name();
-                format!("lost, {name} {axis}: {x:.3} {y:.3} {z:.3} arcsec of front, right, down")
-            })
-    });
     let PerSensor { gyro, accel } = &values.triads;
     let error = |triad: &Normalised| triad.sensitivity.diagonal().add_scalar(-1.0);
+    let (mut unstated, mut missing) = (Vec::new(), Vec::new());
+    let [sigma, noise] = [sigma(values, &mut unstated), noise(values, &mut missing)];
+    let unstated = (!unstated.is_empty()).then(|| {
+        let names = unstated.join(", ");
+        format!("{names}: the calibration does not state sigma for all axes, so KF-GINS takes that of imunoise")
+    });
     let text = format!(
         "\
-# front, right, down:
 initgyrbias: {}  # deg/h
 initaccbias: {}  # mGal
 initgyrscale: {}  # ppm
 initaccscale: {}  # ppm
-# 1 sigma of the calibration; increase it if biases change at switch-on
-{}{}",
+{sigma}{noise}",
         list(&(gyro.bias / DEG_PER_H)),
         list(&(accel.bias / MILLIGAL)),
         list(&(error(gyro) / PPM)),
-        list(&(error(accel) / PPM)),
-        sigma(values),
-        noise(values)
+        list(&(error(accel) / PPM))
     );
+    let sigma = "init...std: 1 sigma of the calibration; increase it if biases change at switch-on";
     Remarks::new(values, "#", &omissions)
-        .reads("KF-GINS reads rad and m/s per sample,")
-        .defines(lost)
+        .omitting(unstated)
+        .omitting(Values::missing(&missing, "KF-GINS"))
+        .reads("KF-GINS reads rad and m/s per sample")
+        .defines([sigma.to_owned()])
         .above(&text)
 }
 
-fn sigma(values: &Values) -> String {
+/// 1σ of the initial values; `unstated` receives the names of values that the calibration does not state for all axes.
+fn sigma(values: &Values, unstated: &mut Vec<&str>) -> String {
     let PerSensor { gyro, accel } = &values.triads;
-    let line = |key: &str, sigma: Option<Vector3<f64>>, unit: f64, name: &str| match sigma
-        .filter(|sigma| sigma.min() > 0.0)
-    {
-        Some(sigma) => format!("{key}: {}  # {name}\n", list(&(sigma / unit))),
-        None => format!("# {key}: the calibration does not state sigma for all three axes\n"),
-    };
-    [
-        line("initbgstd", gyro.bias_sigma, DEG_PER_H, "deg/h"),
-        line("initbastd", accel.bias_sigma, MILLIGAL, "mGal"),
-        line("initsgstd", gyro.scale_sigma, PPM, "ppm"),
-        line("initsastd", accel.scale_sigma, PPM, "ppm"),
-    ]
-    .concat()
+    let all = [
+        ("initbgstd", gyro.bias_sigma, DEG_PER_H, "deg/h"),
+        ("initbastd", accel.bias_sigma, MILLIGAL, "mGal"),
+        ("initsgstd", gyro.scale_sigma, PPM, "ppm"),
+        ("initsastd", accel.scale_sigma, PPM, "ppm"),
+    ];
+    let lines = all.map(|(key, sigma, unit, name)| {
+        match sigma.filter(|sigma: &Vector3<f64>| sigma.min() > 0.0) {
+            Some(sigma) => format!("{key}: {}  # {name}\n", list(&(sigma / unit))),
+            None => {
+                unstated.push(key);
+                String::new()
+            }
+        }
+    });
+    lines.concat()
 }
 
-fn noise(values: &Values) -> String {
-    let missing = values.no_noise();
+/// Noise, if the white noise of both triads is known; otherwise `missing` receives all its names.
+fn noise(values: &Values, missing: &mut Vec<String>) -> String {
     let PerSensor { gyro, accel } = &values.triads;
-    let line = |name: &str, value: Option<f64>, unit: f64, unit_name: &str| match value {
-        Some(value) => format!("  {name}: {}  # {unit_name}\n", list(&[value / unit; 3])),
-        None => format!("#  {name}: [ , , ]  # {unit_name}: {missing}\n"),
+    let of = |triad: &Normalised| triad.density().zip(triad.varying());
+    let Some(((arw, (g, g_is_usual)), (vrw, (a, a_is_usual)))) = of(gyro).zip(of(accel)) else {
+        missing.extend(["arw", "vrw", "gbstd", "abstd", "corrtime"].map(str::to_owned));
+        return String::new();
     };
-    let varying = |triad: &Normalised| triad.varying().map(|bias| bias.sigma);
-    let times = [gyro, accel].into_iter().filter_map(Normalised::varying);
-    let shortest = times.map(|bias| bias.correlation_time).reduce(f64::min);
-    let correlation = match shortest {
-        Some(time) => format!(
+    let line = |name: &str, value: f64, unit: f64, unit_name: &str, is_usual: bool| {
+        let usual = if is_usual {
+            ", usual for this white noise"
+        } else {
+            ""
+        };
+        format!(
+            "  {name}: {}  # {unit_name}{usual}\n",
+            list(&[value / unit; 3])
+        )
+    };
+    let time = match (g_is_usual, a_is_usual) {
+        (false, true) => g.correlation_time,
+        (true, false) => a.correlation_time,
+        _ => g.correlation_time.min(a.correlation_time),
+    };
+    [
+        "imunoise:\n",
+        &line("arw", arw, DEG_PER_SQRT_H, "deg/sqrt(h)", false),
+        &line("vrw", vrw, M_PER_S_PER_SQRT_H, "m/s/sqrt(h)", false),
+        &line("gbstd", g.sigma, DEG_PER_H, "deg/h", g_is_usual),
+        &line("abstd", a.sigma, MILLIGAL, "mGal", a_is_usual),
+        &format!(
             "  corrtime: {}  # h, one value for all; the shorter of gyros and accelerometers\n",
             number(time / HOUR)
         ),
-        None => format!("#  corrtime:   # h: {missing}\n"),
-    };
-    // A key without children is not a mapping, so without figures it becomes a comment too.
-    let key = if values.period.is_some() {
-        "imunoise:\n"
-    } else {
-        "# imunoise:\n"
-    };
-    [
-        key,
-        &line("arw", gyro.density(), DEG_PER_SQRT_H, "deg/sqrt(h)"),
-        &line("vrw", accel.density(), M_PER_S_PER_SQRT_H, "m/s/sqrt(h)"),
-        &line("gbstd", varying(gyro), DEG_PER_H, "deg/h"),
-        &line("abstd", varying(accel), MILLIGAL, "mGal"),
-        "#  gsstd: [ , , ]  # ppm: 1σ of scale-factor variation, from the data sheet\n",
-        "#  asstd: [ , , ]  # ppm: the same\n",
-        &correlation,
     ]
     .concat()
 }

@@ -4,7 +4,7 @@
 
 use nalgebra::Matrix3;
 
-use super::remarks::{Exported, Remarks, about};
+use super::remarks::{Exported, Remarks, equation, title};
 use super::values::Values;
 use turncal::calibration::result::{EQUATION, TriadRecord};
 use turncal::imu::Sensor;
@@ -26,7 +26,10 @@ pub fn write(values: &Values) -> Exported {
     let mut fields = vec![
         ("equation", text(EQUATION)),
         ("axes", text("right, front, up")),
-        ("about", text(&about(values).join("; "))),
+        (
+            "about",
+            text(&(title(values.record) + "; " + &equation(values).join("; "))),
+        ),
     ];
     let word = values.record.word().map(|word| word.to_string());
     fields.extend(word.map(|word| ("verdict", text(&word))));
@@ -46,8 +49,8 @@ pub fn write(values: &Values) -> Exported {
     fields.push(("covariance", numbers(size, &covariance)));
     fields.push(("parameters", text(&values.record.parameters.join(" "))));
     let mut file = vec![b' '; 124];
-    let title = b"MATLAB 5.0 MAT-file, a calibration by turncal";
-    file[..title.len()].copy_from_slice(title);
+    let head = b"MATLAB 5.0 MAT-file, a calibration by turncal";
+    file[..head.len()].copy_from_slice(head);
     // No subsystem data.
     file[116..124].fill(0);
     file.extend([0x00, 0x01, b'I', b'M']);

@@ -64,7 +64,7 @@ const IN_AUTOPILOTS: &str = "change of scale factors and misalignments with temp
 /// Every format.
 #[rustfmt::skip]
 pub static FORMATS: [Format; 14] = [
-    row("kalibr", "yaml", "IMU intrinsics for Kalibr, model scale-misalignment", RightFrontUp, kalibr::kalibr),
+    row("kalibr", "yaml", "IMU configuration for Kalibr, with intrinsics of model scale-misalignment", Log, kalibr::kalibr),
     row("kf-gins", "yaml", "IMU section of a KF-GINS configuration", FrontRightDown, kf_gins::write),
     row("c", "h", "A C99 header with constants and a function", RightFrontUp, code::write).with_temperature(""),
     row("text", "txt", "All values with name, σ and unit", RightFrontUp, text::write),

@@ -34,7 +34,7 @@ pub fn list<'a>(values: impl IntoIterator<Item = &'a f64>) -> String {
     format!("[{}]", values.join(", "))
 }
 
-/// A matrix as a YAML list of rows, each a line indented by `indent`.
+/// A matrix as a YAML list of rows, each a line indented by `indent`, which must be deeper than its key for OpenCV.
 pub fn rows<R: Dim, C: Dim>(
     indent: usize,
     matrix: &Matrix<f64, R, C, impl RawStorage<f64, R, C>>,

@@ -1,11 +1,13 @@
 //! The memory of a RealSense D400 camera, which calibrates its output itself.
 //!
-//! Source: librealsense, `tools/rs-imu-calibration/rs-imu-calibration.py`.
+//! Source: librealsense, `tools/rs-imu-calibration/rs-imu-calibration.py`; `src/ds/ds-calib-parsers.cpp`,
+//! `dm_v2_imu_calib_parser::get_intrinsic`.
 
 use super::affine::Affine;
 use super::remarks::{Exported, Remarks};
 use super::values::Values;
 use turncal::imu::PerSensor;
+use turncal::units::DEGREE;
 
 /// A table with its header: version, kind, size, and checksum of the content.
 fn table([major, minor]: [u8; 2], kind: u16, content: &[u8]) -> Vec<u8> {
@@ -20,7 +22,8 @@ fn table([major, minor]: [u8; 2], kind: u16, content: &[u8]) -> Vec<u8> {
 
 /// The 520 bytes of the memory of the motion module, as `rs-imu-calibration` writes them.
 ///
-/// librealsense computes `matrix n − bias`, with matrices column by column. Unused bytes are 0xff.
+/// librealsense computes `matrix n − bias`, with matrices column by column and the gyro bias of the table in °/s. Unused
+/// bytes are 0xff.
 pub fn write(values: &Values) -> Exported {
     let program = PerSensor::from_fn(|sensor| Affine::complete(values.triads.get(sensor)));
     let notes = [
@@ -30,9 +33,15 @@ pub fn write(values: &Values) -> Exported {
     let mut imu = vec![0xff; 37 * 4 + 96];
     // Intrinsics are set, extrinsics are not.
     imu[..4].copy_from_slice(&(1u32 << 8).to_le_bytes());
-    let of_triad =
-        |triad: &Affine| [triad.matrix.as_slice(), triad.corrected_bias().as_slice()].concat();
-    let numbers = [of_triad(&program.accel), of_triad(&program.gyro)].concat();
+    let of_triad = |triad: &Affine, unit: f64| {
+        let bias = triad.corrected_bias() / unit;
+        [triad.matrix.as_slice(), bias.as_slice()].concat()
+    };
+    let numbers = [
+        of_triad(&program.accel, 1.0),
+        of_triad(&program.gyro, DEGREE),
+    ]
+    .concat();
     for (place, value) in imu[13 * 4..].chunks_exact_mut(4).zip(numbers) {
         place.copy_from_slice(&(value as f32).to_le_bytes());
     }

@@ -1,9 +1,9 @@
-//! Comments above the values of a format: instrument, definitions, omissions.
+//! Comments above the values of a format, one line each: instrument, definitions, omissions.
 
 use super::affine::{Affine, Residual};
-use super::notation::{comment, list, numbers};
+use super::notation::{comment, list};
 use super::values::Values;
-use turncal::calibration::result::{EQUATION, Method};
+use turncal::calibration::result::{Calibration, EQUATION, Method};
 use turncal::imu::{AxisOrder, PerSensor, Sensor, Term};
 use turncal::run::Aiding;
 
@@ -24,7 +24,7 @@ pub struct Remarks<'a> {
     values: &'a Values<'a>,
     mark: &'static str,
     omissions: Vec<String>,
-    /// Definition of the values, below everything else.
+    /// Definition of the values.
     definitions: Vec<String>,
     /// Error terms that need no mention.
     is_included: fn(Term) -> bool,
@@ -50,11 +50,9 @@ impl<'a> Remarks<'a> {
         omissions: &[&str],
     ) -> Self {
         let residuals = Residual::all(values, program);
-        let words = residuals.iter().map(Residual::words);
         let mut remarks = Self::new(values, mark, &[omissions, &[SIGMA]].concat()).reads(reads);
+        let words = residuals.iter().map(Residual::words);
         remarks.omissions.splice(0..0, words);
-        let lines = residuals.iter().flat_map(Residual::lines);
-        remarks.definitions.extend(lines);
         remarks
     }
 
@@ -73,26 +71,23 @@ impl<'a> Remarks<'a> {
             _ => "the axes of the log",
         };
         let [gyro, accel] = Sensor::ALL.map(|sensor| list(&self.values.triads.get(sensor).nominal));
-        self.defines([
-            String::new(),
-            format!("{what} along {axes};"),
-            format!(
-                "to convert the raw output, divide gyros by {gyro} and accelerometers by {accel}"
-            ),
-        ])
+        let body = self.values.record.body_frame.words();
+        self.defines([format!(
+            "{what} along {axes} ({body}): the raw output per second divided by {gyro} (gyros) and {accel} \
+             (accelerometers)"
+        )])
+    }
+
+    /// Adds omissions.
+    pub fn omitting(mut self, notes: impl IntoIterator<Item = String>) -> Self {
+        self.omissions.extend(notes);
+        self
     }
 
     /// Adds further lines.
     pub fn defines(mut self, lines: impl IntoIterator<Item = String>) -> Self {
         self.definitions.extend(lines);
         self
-    }
-
-    /// Adds raw outputs and their calibrated values.
-    pub fn with_test_vectors(self) -> Self {
-        let lines = test_vectors(self.values);
-        let blank = (!lines.is_empty()).then(String::new);
-        self.defines(blank.into_iter().chain(lines))
     }
 
     /// The omissions, and the error terms that the format omits.
@@ -107,26 +102,12 @@ impl<'a> Remarks<'a> {
         self.omissions.iter().cloned().chain(note).collect()
     }
 
-    /// Parameters of omitted error terms, one line each, in SI.
-    fn terms(&self) -> impl Iterator<Item = String> {
-        let correction = &self.values.correction;
-        correction.terms().filter_map(|k| {
-            let term = Term::of(k).filter(|&term| !(self.is_included)(term))?;
-            let (name, value, entry) =
-                (Term::parameter_name(k)?, correction.terms[k], term.entry());
-            let (unit, adds) = (entry.si_unit, entry.adds);
-            Some(format!("{name} = {value:e} {unit}, adds {adds}"))
-        })
-    }
-
     /// All lines as comments.
     pub fn text(&self) -> String {
-        let omitted = self.omitted().into_iter();
-        let omitted = omitted.map(|note| format!("not included: {note}"));
-        let lines = about(self.values).into_iter().chain(omitted);
-        let lines = lines
-            .chain(self.terms())
-            .chain(self.definitions.iter().cloned());
+        let omitted = self.omitted().join("; ");
+        let omitted = (!omitted.is_empty()).then(|| format!("not included: {omitted}"));
+        let lines = [title(self.values.record)].into_iter();
+        let lines = lines.chain(self.definitions.iter().cloned()).chain(omitted);
         lines.map(|line| comment(self.mark, &line)).collect()
     }
 
@@ -144,29 +125,33 @@ impl<'a> Remarks<'a> {
     }
 }
 
-/// Instrument of the calibration, and definitions of `N` and `u`.
-pub fn about(values: &Values) -> Vec<String> {
-    let record = values.record;
+/// Program, method, instrument and verdict.
+pub fn title(record: &Calibration) -> String {
     let method = match (record.method, record.aiding) {
         (Some(Method::Ekf), Some(Aiding::Table)) => "Kalman filter, standstill and table attitude",
         (Some(Method::Ekf), _) => "Kalman filter, standstill only",
         (Some(Method::SixPosition), _) => "closed form from static positions",
         (None, _) => "not stated",
     };
-    let version = env!("CARGO_PKG_VERSION");
-    let mut lines = vec![
-        format!("IMU calibration, exported by turncal {version}"),
+    let mut parts = vec![
+        format!("IMU calibration by turncal {}", env!("CARGO_PKG_VERSION")),
         format!("method: {method}"),
     ];
     let meta = record.meta.iter();
-    lines.extend(meta.map(|(name, value)| format!("{name}: {value}")));
-    if let Some(word) = record.word() {
-        lines.push(format!("verdict of the calibration: {word}"));
-    }
+    parts.extend(meta.map(|(name, value)| format!("{name}: {value}")));
+    parts.extend(record.word().map(|word| format!("verdict: {word}")));
     if record.is_failed() {
-        lines.push("WARNING: do not use these values".to_owned());
+        parts.push("WARNING: do not use these values".to_owned());
     }
-    lines.extend(record.warnings.iter().map(|w| format!("warning: {w}")));
+    if !record.warnings.is_empty() {
+        parts.push("warnings are in calibration.json".to_owned());
+    }
+    parts.join("; ")
+}
+
+/// Definitions of `N` and `u`, for formats whose values are those of the record.
+pub fn equation(values: &Values) -> [String; 2] {
+    let record = values.record;
     let axes = match &record.columns {
         Some(PerSensor { gyro, accel }) => format!(
             "axes x, y, z of N and u (right, front, up): columns {} and {} of the log",
@@ -177,29 +162,16 @@ pub fn about(values: &Values) -> Vec<String> {
                  one along front, left, up"
             .to_owned(),
     };
-    lines.extend([
-        String::new(),
-        EQUATION.to_owned(),
+    [
         format!(
-            "N: raw output per second, gyros in {}, accelerometers in {}; divide pulses or increments by the sample \
-             period and use rates unchanged",
+            "{EQUATION}; N: raw output per second (pulses and increments divided by the sample period), gyros in {}, \
+             accelerometers in {}",
             values.unit(Sensor::Gyro),
             values.unit(Sensor::Accel)
         ),
         format!(
-            "u: angular rate in rad/s, specific force in m/s^2, along: {}",
+            "u: angular rate in rad/s, specific force in m/s^2, along: {}; {axes}",
             record.body_frame.words()
         ),
-        axes,
-    ]);
-    lines
-}
-
-/// Raw outputs with calibrated values, one line each below a title; nothing if the record has none.
-pub fn test_vectors(values: &Values) -> Vec<String> {
-    let vectors = values.record.test_vectors.iter();
-    let lines = vectors.map(|v| format!("{} -> {}", numbers(&v.raw), numbers(&v.calibrated)));
-    let title = "test vectors, raw -> calibrated, gyros x y z, accelerometers x y z:".to_owned();
-    let title = (!values.record.test_vectors.is_empty()).then_some(title);
-    title.into_iter().chain(lines).collect()
+    ]
 }

@@ -15,9 +15,9 @@ pub fn covariance(values: &Values) -> Exported {
         "scale, misalignment and bias; publish the output of `turncal apply`, which has these errors removed",
         "bias drift, which is not white; measure it with `turncal allan`",
     ];
-    let line = |(key, sensor)| match values.triads.get(sensor).density().zip(values.period) {
-        Some((density, period)) => {
-            let variance = density.powi(2) / period;
+    let line = |(key, sensor)| match values.triads.get(sensor).density().zip(values.rate) {
+        Some((density, rate)) => {
+            let variance = density.powi(2) * rate;
             let all = [0, 1, 2, 3, 4, 5, 6, 7, 8].map(|k| if k % 4 == 0 { variance } else { 0.0 });
             format!("{key}: {}\n", list(&all))
         }
@@ -30,7 +30,7 @@ pub fn covariance(values: &Values) -> Exported {
     let variance = "variance per sample: density^2 times rate, (rad/s)^2 and (m/s^2)^2";
     Remarks::new(values, "#", &notes)
         .including(|_| true)
-        .defines([String::new(), variance.to_owned()])
+        .defines([variance.to_owned()])
         .above(&lines.map(line).concat())
 }
 
@@ -43,7 +43,7 @@ pub fn imu_calib(values: &Values) -> Exported {
     let notes = [
         "gyro biases: imu_calib averages the gyros at its start, which includes Earth rate of up to 15.041 deg/h",
     ];
-    let reads = ("#", "imu_calib reads rad/s and m/s^2, here");
+    let reads = ("#", "imu_calib reads rad/s and m/s^2");
     let matrix = list(&program.accel.matrix.transpose());
     let bias = list(&program.accel.corrected_bias());
     Remarks::of_program(values, reads, &program, &notes)

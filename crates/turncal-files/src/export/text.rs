@@ -2,7 +2,8 @@
 
 use nalgebra::Vector3;
 
-use super::remarks::{Exported, Remarks, test_vectors};
+use super::notation::numbers;
+use super::remarks::{Exported, Remarks, equation};
 use super::values::Values;
 use turncal::imu::{AXES, Sensor, Term};
 use turncal::units::{DEG_PER_H, MICRO_G};
@@ -30,13 +31,14 @@ pub fn write(values: &Values) -> Exported {
             row(&name, matrix[(i, j)], None, &unit)
         }));
     }
-    let mut vectors = test_vectors(values);
-    if let Some(title) = vectors.first_mut() {
-        title.insert(0, '\n');
-    }
-    lines.extend(vectors);
+    let vectors = &values.record.test_vectors;
+    let title = "\ntest vectors, raw -> calibrated, gyros x y z, accelerometers x y z:";
+    lines.extend((!vectors.is_empty()).then(|| title.to_owned()));
+    let vectors = vectors.iter();
+    lines.extend(vectors.map(|v| format!("{} -> {}", numbers(&v.raw), numbers(&v.calibrated))));
     Remarks::new(values, "#", &[covariance])
         .including(|_| true)
+        .defines(equation(values))
         .above(&(lines.join("\n") + "\n"))
 }
 

@@ -3,8 +3,9 @@
 use nalgebra::{Matrix3, Vector3};
 
 use crate::unit_scale;
+use turncal::calibration::model::usual_variation;
 use turncal::calibration::result::{Calibration, TriadRecord};
-use turncal::calibration::{Correction, CorrectionError};
+use turncal::calibration::{Correction, CorrectionError, Source};
 use turncal::imu::{AXES, AxisOrder, GaussMarkov, Noise, PerSensor, Sensor, Term};
 use turncal::run::Run;
 
@@ -31,8 +32,8 @@ pub struct Values<'a> {
     pub triads: PerSensor<Normalised>,
     /// Gyro output per specific force, along the axes of the format.
     pub g_sensitivity: Matrix3<f64>,
-    /// Sample period of the run, s.
-    pub period: Option<f64>,
+    /// Samples per second of the run, or of the calibration's own recording.
+    pub rate: Option<f64>,
 }
 
 /// A triad in rad/s or m/s²: `n = sensitivity u + bias`, `u = inverse (n − bias)`, with `n = N / nominal`.
@@ -48,7 +49,7 @@ pub struct Normalised {
     pub bias_sigma: Option<Vector3<f64>>,
     /// Coefficients of powers 1 to 3 of the bias about the reference temperature, axis by axis, in n per °C, °C², °C³.
     pub bias_powers: [[f64; ORDERS]; 3],
-    /// Stated noise of the run.
+    /// Noise with white noise above zero, if it is known.
     pub noise: Option<Noise>,
 }
 
@@ -70,6 +71,10 @@ impl<'a> Values<'a> {
             Axes::FrontRightDown => AxisOrder::FRONT_RIGHT_DOWN,
             Axes::Log => log.map_or(AxisOrder::IDENTITY, |log| log.named.axes),
         };
+        let of_record = record.provenance.as_ref().map(|from| from.rate_hz);
+        let rate = run
+            .map(|run| run.recording.imu.period.recip())
+            .or(of_record);
         let turn = order.matrix();
         let q = Term::GSensitivity.parameters().start;
         let g_sensitivity = Matrix3::from_fn(|i, j| correction.terms[q + 3 * i + j]);
@@ -78,7 +83,7 @@ impl<'a> Values<'a> {
                 Normalised::new(record, &correction, run, &order, sensor)
             }),
             g_sensitivity: turn.transpose() * g_sensitivity * turn,
-            period: run.map(|run| run.recording.imu.period),
+            rate: rate.filter(|rate| *rate > 0.0),
             record,
             correction,
             order,
@@ -106,12 +111,13 @@ impl<'a> Values<'a> {
         Some(self.record.sigma.as_ref()?.get(sensor))
     }
 
-    /// Reason for a missing noise figure.
-    pub fn no_noise(&self) -> &'static str {
-        match self.period {
-            Some(_) => "[imu.noise] in run.toml does not state it",
-            None => "measure it with `turncal allan` or export with --run RUN.toml",
-        }
+    /// Omission of these keys; `None` if there are none.
+    pub fn missing(keys: &[String], program: &str) -> Option<String> {
+        let keys = (!keys.is_empty()).then(|| keys.join(", "))?;
+        Some(format!(
+            "{keys}: {program} does not start without them; export with --run RUN.toml, or measure them with \
+             `turncal allan`"
+        ))
     }
 }
 
@@ -157,17 +163,44 @@ impl Normalised {
             bias_sigma: sigma.map(|sigma| in_n(sigma.bias)),
             nominal,
             bias_powers,
-            noise: run.map(|run| *run.instrument.noise.get(sensor)),
+            noise: noise(record, run, sensor),
         }
     }
 
-    /// White noise density of the run, rad/√s or (m/s)/√s.
+    /// White noise density, rad/√s or (m/s)/√s.
     pub fn density(&self) -> Option<f64> {
         Some(self.noise?.random_walk)
     }
 
-    /// Bias variation of the run.
-    pub fn varying(&self) -> Option<GaussMarkov> {
-        self.noise?.gauss_markov
+    /// Bias variation, and whether it is only the usual variation for this white noise.
+    pub fn varying(&self) -> Option<(GaussMarkov, bool)> {
+        let noise = self.noise?;
+        let usual = || (usual_variation(&noise), true);
+        Some(noise.gauss_markov.map_or_else(usual, |bias| (bias, false)))
     }
+}
+
+/// The noise of the run. A figure that the calibration refuted, or that no run states, is replaced by the estimate of
+/// the calibration.
+fn noise(record: &Calibration, run: Option<&Run>, sensor: Sensor) -> Option<Noise> {
+    let mut noise = run.map_or_else(Noise::default, |run| *run.instrument.noise.get(sensor));
+    let report = record.noise.as_ref().map(|noise| &noise.report);
+    let estimated = |source: Source, stated: f64| {
+        let sources = &report.filter(|report| report.learnt)?.sources;
+        let figures = sources.iter().find(|of| of.source == source)?;
+        let unit = source.unit().1;
+        let agrees = |[low, high]: [f64; 2]| (low..=high).contains(&(stated / unit));
+        let is_used = figures.used > 0.0 && !figures.interval.is_some_and(agrees);
+        is_used.then_some(figures.used * unit)
+    };
+    let (white, varying) = sensor.pick(
+        (Source::AngleRandomWalk, Source::GyroGaussMarkov),
+        (Source::VelocityRandomWalk, Source::AccelGaussMarkov),
+    );
+    noise.random_walk = estimated(white, noise.random_walk).unwrap_or(noise.random_walk);
+    let stated = noise.gauss_markov;
+    let usual = stated.unwrap_or_else(|| usual_variation(&noise));
+    let sigma = estimated(varying, stated.map_or(0.0, |bias| bias.sigma));
+    noise.gauss_markov = sigma.map(|sigma| GaussMarkov { sigma, ..usual }).or(stated);
+    Some(noise).filter(|noise| noise.random_walk > 0.0)
 }

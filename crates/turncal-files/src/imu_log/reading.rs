@@ -195,6 +195,7 @@ impl ImuLog<'_> {
                 continue;
             }
             notes.extend(clock.uneven());
+            notes.extend(csv.left_out());
             notes.extend(csv.cut_off("turncal ignored it"));
             notes.extend_from_slice(csv.remarks());
             notes.extend(reading.notes());

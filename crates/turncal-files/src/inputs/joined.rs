@@ -185,6 +185,7 @@ impl Track {
             return Err(rows.error(found, "at least 2", advice));
         }
         let mut remarks = rows.remarks().to_vec();
+        remarks.extend(rows.left_out());
         remarks.extend(rows.cut_off("turncal ignored it"));
         remarks.extend(stamps.notes(rows.file(), 0));
         let clock = Uniform::new(&part.source.file, &stamps.of_rows, part.clock.period)

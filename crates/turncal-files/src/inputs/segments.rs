@@ -57,6 +57,7 @@ pub fn read(
         });
     }
     // A label without letters is not a label; this is reported elsewhere.
+    notes.extend(csv.left_out());
     let cut_off = csv.cut_off("turncal used it");
     notes.extend(cut_off.filter(|_| label_column + 1 != csv.header().len()));
     Ok(segments)

@@ -173,6 +173,7 @@ impl TableLogFile<'_> {
                 }
             }
         }
+        notes.extend(csv.left_out());
         notes.extend(csv.cut_off("turncal ignored it"));
         notes.extend(stamps.notes(csv.file(), 0));
         attitude.shrink_to_fit();

@@ -195,7 +195,7 @@ impl InstrumentFields<'_> {
                 &self.log.source.file,
                 "rows without time stamps, and turns that are not good enough to estimate the sample period",
                 "a time column or sample_period_s in run.toml",
-                "Add sample_period_s to [imu].",
+                "State sample_period_s (--rate).",
             ));
         };
         // The scale factors of the gyros are taken to be right on average.

@@ -1,10 +1,11 @@
 //! Structure of a text from its first lines: preamble, lines of names and units, and rows, possibly tagged.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::clock_text::ClockText;
 use super::lines::{Line, Stop};
 use super::row::{Malformed, Row};
+use super::shape::{Added, Labelled, SEPARATOR, Sample, Stream};
 
 /// Number of rows at the end of the first lines that define the row format.
 const ROWS: usize = 64;
@@ -25,6 +26,8 @@ const SCALES: [(&str, char, &str); 3] = [
 #[derive(Debug, Clone, PartialEq)]
 pub struct Heading {
     pub delimiter: Delimiter,
+    /// Whether each column holds numbers.
+    pub numbers: Vec<bool>,
     /// Column names: `1`, `2`, … if the file has none.
     pub names: Vec<String>,
     /// Line of the names, or of the first row if there are no names.
@@ -39,6 +42,8 @@ pub struct Heading {
     pub remarks: Vec<String>,
     /// Number of first lines that are not rows.
     pub above: usize,
+    /// Number of rows among the first lines.
+    pub rows: usize,
 }
 
 /// Rows of several kinds, identified by the word or number in one column.
@@ -132,15 +137,22 @@ impl Shape {
     /// must have a name.
     fn of(rows: &[&Look], all: &[Look]) -> Option<Self> {
         let rows = &rows[rows.len() - ROWS.min(rows.len().div_ceil(2))..];
-        let mut shapes = BTreeMap::new();
-        for row in rows {
-            if let Ok(fields) = &row.fields {
-                *shapes.entry((row.delimiter, fields.len())).or_insert(0) += 1;
+        // The separator is common to the rows and separates numbers; a note may contain other separators.
+        let mut shapes = BTreeMap::<_, (usize, usize)>::new();
+        let own = rows.iter().map(|row| row.delimiter);
+        let delimiters = own.chain([b',', b';', b'\t'].map(Delimiter::Byte));
+        let delimiters: BTreeSet<Delimiter> = delimiters.collect();
+        let pairs = delimiters.into_iter();
+        for (delimiter, row) in pairs.flat_map(|of| rows.iter().map(move |row| (of, row))) {
+            if let Ok(fields) = delimiter.fields(&row.text) {
+                let (rows, numbers) = shapes.entry((delimiter, fields.len())).or_default();
+                *rows += 1;
+                *numbers += fields.iter().filter(|field| is_number(field)).count();
             }
         }
         let most = shapes
             .into_iter()
-            .max_by_key(|((_, columns), count)| (*count, *columns));
+            .max_by_key(|((_, columns), (rows, numbers))| (*columns > 1, *rows, *numbers));
         let ((delimiter, mut columns), _) = most?;
         let rows = rows.iter().filter_map(|row| row.fields(delimiter, columns));
         let rows: Vec<Vec<String>> = rows.collect();
@@ -181,6 +193,8 @@ struct Named {
     units: Option<Vec<String>>,
     line: u64,
     above: usize,
+    /// Remark on a row above the others that is incomplete.
+    cut: Option<String>,
 }
 
 impl Looks {
@@ -188,8 +202,41 @@ impl Looks {
         Self(lines.map(Look::of).collect())
     }
 
-    /// Heading of all rows, or of those with a tag. None for a file without rows.
-    pub fn heading(&self, tag: Option<(&Tags, &str)>) -> Result<Option<Heading>, Stop> {
+    /// Samples of a labelled stream, and the other lines.
+    pub fn of_stream<'a>(
+        lines: impl Iterator<Item = &'a Line>,
+        labelled: &Labelled,
+        stream: &Stream,
+    ) -> Self {
+        let mut sample = Sample::default();
+        let looks = lines.filter_map(|line| {
+            let mut text = line.text.clone();
+            match sample.add(labelled, stream, &mut text) {
+                Added::Complete => {
+                    let text = text_of(&text);
+                    Some(Look {
+                        number: line.number,
+                        is_comment: false,
+                        delimiter: Delimiter::Byte(SEPARATOR),
+                        fields: Delimiter::Byte(SEPARATOR).fields(&text),
+                        text,
+                    })
+                }
+                Added::Part => None,
+                Added::Nothing if labelled.knows(&line.text) => None,
+                Added::Nothing => Some(Look::of(line)),
+            }
+        });
+        Self(looks.collect())
+    }
+
+    /// Heading of all rows, of the rows with a tag, or of the samples of a labelled stream; `None` for a file without
+    /// rows.
+    pub fn heading(
+        &self,
+        tag: Option<(&Tags, &str)>,
+        labelled: Option<&Stream>,
+    ) -> Result<Option<Heading>, Stop> {
         let is_of_tag =
             |look: &&Look| tag.is_none_or(|(tags, tag)| look.field(tags.column) == Some(tag));
         let rows: Vec<&Look> = self
@@ -211,17 +258,13 @@ impl Looks {
             units,
             line,
             above,
-        } = self.named(&shape, first, tag)?;
+            cut,
+        } = self
+            .of_labels(labelled, first)
+            .map_or_else(|| self.named(&shape, first, tag), Ok)?;
+        let above = if labelled.is_some() { 0 } else { above };
         let rows: Vec<Vec<String>> = rows.iter().filter_map(|row| shape.row(row)).collect();
-        let clock = |column: usize| {
-            let texts: Vec<&str> = rows
-                .iter()
-                .map(|row| row[column].as_str())
-                .filter(|text| !text.is_empty())
-                .collect();
-            ClockText::of(&texts)
-        };
-        let clocks: Vec<_> = (0..shape.numbers.len()).map(clock).collect();
+        let clocks = clocks(&rows, shape.numbers.len());
         let says = self
             .0
             .iter()
@@ -229,15 +272,11 @@ impl Looks {
             .filter(|(k, look)| look.is_comment || *k < above);
         let says: Vec<&str> = says.map(|(_, look)| look.text.as_str()).collect();
         let of_clocks = clocks.iter().zip(&names);
-        let mut remarks: Vec<String> = of_clocks
-            .filter_map(|(clock, name)| clock.as_ref()?.remark(name))
-            .collect();
-        remarks.extend(value(&says, "orientation").map(|letters| {
-            format!("turncal did not apply the orientation {letters} that the file states; the columns were used \
-                unchanged.")
-        }));
+        let of_clocks = of_clocks.filter_map(|(clock, name)| clock.as_ref()?.remark(name));
+        let remarks = of_clocks.chain(orientation(&says)).chain(cut).collect();
         Ok(Some(Heading {
             delimiter: shape.delimiter,
+            numbers: shape.numbers,
             units: units_with(units, &names, &clocks, &says),
             names,
             line,
@@ -245,7 +284,25 @@ impl Looks {
             rate: says.iter().find_map(|remark| rate(remark)),
             remarks,
             above,
+            rows: rows.len(),
         }))
+    }
+
+    /// The names of values according to the words next to them, if there are any.
+    fn of_labels(&self, labelled: Option<&Stream>, first: usize) -> Option<Named> {
+        let stream = labelled.filter(|of| of.names.iter().any(|name| !name.is_empty()))?;
+        let names = stream.names.iter().zip(1..);
+        let own = |(name, k): (&String, usize)| match &**name {
+            "" => k.to_string(),
+            _ => name.clone(),
+        };
+        Some(Named {
+            names: names.map(own).collect(),
+            units: Some(stream.units.clone()),
+            line: self.0.get(first).map_or(0, |look| look.number),
+            above: 0,
+            cut: None,
+        })
     }
 
     /// The line of column names above this row, and its position.
@@ -270,6 +327,16 @@ impl Looks {
             });
             words(*k).is_some() && is_other != Some(true)
         };
+        // The line immediately above the rows is the most likely heading, even if rows lack the field of a remark.
+        let above = first.checked_sub(1).and_then(|above| looks.get(above));
+        let columns = shape.numbers.len();
+        let is_longer = above.is_some_and(|look| {
+            let filled = look.words(shape.delimiter, columns + 1);
+            !look.is_comment && filled.is_some_and(|of| of.iter().all(|word| !word.is_empty()))
+        });
+        if is_longer && own.is_none() {
+            return self.unnamed(shape, first, tag.is_some());
+        }
         let Some(last) = own.or_else(|| (0..first).rfind(is_shared)) else {
             return self.unnamed(shape, first, tag.is_some());
         };
@@ -284,6 +351,7 @@ impl Looks {
             units,
             line: looks[begin].number,
             above: if tag.is_some() { 0 } else { last + 1 },
+            cut: None,
         })
     }
 
@@ -297,6 +365,7 @@ impl Looks {
             units: None,
             line: looks.get(first).map_or(0, |look| look.number),
             above,
+            cut: None,
         };
         let above = (0..first).rfind(|&k| !looks[k].is_comment && !is_tagged);
         let Some((above, look)) = above.map(|k| (k, &looks[k])) else {
@@ -311,12 +380,30 @@ impl Looks {
         let has_numbers = fields.iter().any(|field| is_number(field));
         Ok(match look.fields(shape.delimiter, columns) {
             None if !is_near => numbered(first),
-            None if has_numbers => numbered(above),
-            fitting => Named {
-                names: fitting.unwrap_or(fields),
-                line: look.number,
-                ..numbered(above + 1)
+            None if has_numbers => Named {
+                cut: Some(format!(
+                    "Line {} has {} fields, the rows below it have {columns}. turncal left it out.",
+                    look.number,
+                    fields.len()
+                )),
+                ..numbered(first)
             },
+            fitting => {
+                let mut names = fitting.unwrap_or(fields);
+                let is_longer = names.len() == columns + 1;
+                let more = is_longer.then(|| names.pop()).flatten();
+                Named {
+                    names,
+                    line: look.number,
+                    cut: more.map(|more| {
+                        format!(
+                            "The rows have no field for the last name in line {}, `{more}`.",
+                            look.number
+                        )
+                    }),
+                    ..numbered(above + 1)
+                }
+            }
         })
     }
 
@@ -358,6 +445,24 @@ impl Looks {
             })
         })
     }
+}
+
+/// Conversion of the text of each column to times.
+fn clocks(rows: &[Vec<String>], columns: usize) -> Vec<Option<ClockText>> {
+    let clock = |column: usize| {
+        let texts = rows.iter().map(|row| row[column].as_str());
+        let texts: Vec<&str> = texts.filter(|text| !text.is_empty()).collect();
+        ClockText::of(&texts)
+    };
+    (0..columns).map(clock).collect()
+}
+
+/// Remark on an orientation stated in a preamble.
+fn orientation(says: &[&str]) -> Option<String> {
+    let letters = value(says, "orientation")?;
+    Some(format!(
+        "turncal did not apply the orientation {letters} that the file states; the columns were used unchanged."
+    ))
 }
 
 /// Whether a column after the first increases in all rows.
@@ -522,17 +627,10 @@ impl Delimiter {
         self.byte() != b','
     }
 
-    /// Leaves one delimiter between two fields, and one after a word followed by a colon and numbers.
+    /// Leaves one delimiter between two fields.
     pub fn tidy(self, line: &mut Vec<u8>) {
         if self == Self::Blanks {
             collapse_blanks(line);
-        }
-        if line.first().is_some_and(u8::is_ascii_alphabetic)
-            && let Some(end) = line.iter().position(|byte| !byte.is_ascii_alphanumeric())
-            && let [b':', next, ..] = line[end..]
-            && (next.is_ascii_digit() || b"+-. ".contains(&next))
-        {
-            line[end] = self.byte();
         }
     }
 

@@ -126,7 +126,7 @@ impl Lines {
     }
 
     /// The first lines.
-    pub fn ahead(&self) -> impl Iterator<Item = &Line> {
+    pub fn ahead(&self) -> impl Iterator<Item = &Line> + Clone {
         self.ahead.iter()
     }
 
@@ -136,8 +136,8 @@ impl Lines {
         self.row = passed.map_or(0, |line| line.number);
     }
 
-    /// Advances to the next line that is not a comment; false at the end of the file.
-    pub fn advance(&mut self) -> Result<bool, Stop> {
+    /// Advances to the next line that is not a comment, or to any line; false at the end of the file.
+    pub fn advance(&mut self, any: bool) -> Result<bool, Stop> {
         let mut left = LONGEST;
         loop {
             match self.ahead.pop_front() {
@@ -153,7 +153,7 @@ impl Lines {
             }
             // Most rows begin with a digit and need no further test.
             let is_row = self.line.text.first().is_some_and(u8::is_ascii_digit);
-            if is_row || self.line.comment().is_none() {
+            if is_row || any || self.line.comment().is_none() {
                 self.row = self.line.number;
                 return Ok(true);
             }

@@ -4,23 +4,38 @@
 use serde_json::json;
 
 use crate::calibration::{
-    Finding, FindingKind as Kind, Level, OBSERVED_BELOW, Outcome, auxiliary_name, parameter_name,
+    AuxiliaryKind, ErrorTerm, Finding, FindingKind as Kind, Level, OBSERVED_BELOW, Outcome,
+    auxiliary_name, parameter_name,
 };
+use crate::imu::Term;
 use crate::units::DEGREE;
 
 /// All findings on quantities that the path of a filter's run does not determine.
-pub fn not_observed_by_path(outcome: &Outcome) -> Vec<Finding> {
-    let path = "this path";
+///
+/// Parameters that are far from their prior are known; the prior is wrong.
+pub fn not_observed_by_path(outcome: &Outcome, far: Option<&Finding>) -> Vec<Finding> {
     let (form, hidden) = (outcome.estimate.form(), outcome.unobserved().into_iter());
-    let parameters: Vec<String> = hidden.filter_map(|i| parameter_name(form, i)).collect();
+    let mut parameters: Vec<String> = hidden.filter_map(|i| parameter_name(form, i)).collect();
     let together = outcome.observability.combinations(&parameters);
-    let constants = outcome.auxiliary.unobserved().filter_map(auxiliary_name);
+    if let Some(far) = far.and_then(|far| far.figures["parameters"].as_array()) {
+        parameters.retain(|name| !far.iter().any(|far| far == name));
+    }
+    let is_asked = |term: ErrorTerm| {
+        let mut candidates = outcome.terms.iter().filter(|of| of.present < 1.0);
+        candidates.all(|of| of.term != term)
+    };
+    let constants = outcome
+        .auxiliary
+        .unobserved()
+        .filter(|&index| AuxiliaryKind::of(index).is_some_and(|kind| is_asked(kind.error_term())));
+    let even = is_asked(ErrorTerm::Instrument(Term::AccelAsymmetry))
+        && outcome.auxiliary.even_terms_inseparable();
     let findings = [
-        not_observed(path, parameters),
+        not_observed("this path", parameters),
         combinations(together),
         (!outcome.heading_observed()).then(|| heading(outcome.attitude_sigma.z)),
-        not_observed(path, constants.collect()).map(|finding| finding.at(Level::Note)),
-        outcome.auxiliary.even_terms_inseparable().then(even_terms),
+        constants_not_observed(constants.filter_map(auxiliary_name).collect()),
+        even.then(even_terms),
         temperature_not_seen(unseen_temperature(outcome)),
     ];
     findings.into_iter().flatten().collect()
@@ -43,13 +58,42 @@ fn unseen_temperature(outcome: &Outcome) -> Vec<String> {
 
 /// The finding on parameters that kept more than half of their prior σ, if any.
 pub fn not_observed(by: &str, parameters: Vec<String>) -> Option<Finding> {
+    let has = |group: &str| parameters.iter().any(|name| name.starts_with(group));
+    let remedies = [
+        (
+            "gyro.scale",
+            "turns of at least 90° about each of these axes",
+        ),
+        (
+            "gyro.installation",
+            "turns of at least 90° about the other axes",
+        ),
+        ("gyro.bias", "longer dwells with different axes up"),
+        ("accel", "dwells with each axis up and each axis down"),
+    ];
+    let remedies = remedies.iter().filter(|(group, _)| has(group));
+    let remedies: Vec<&str> = remedies.map(|(_, remedy)| *remedy).collect();
     let text = format!(
-        "Not determined by {by} (σ is still more than half of the prior): {}. Add positions or turns that excite \
-         these parameters, or state a smaller σ in [imu.prior].",
-        listed(&parameters)
+        "Not determined by {by} (σ is still more than half of the prior): {}. The stated values are kept; do not use \
+         them as calibrated. Add {}.",
+        listed(&parameters),
+        remedies.join(", and ")
     );
     let figures = json!({ "by": by, "parameters": parameters });
     (!parameters.is_empty()).then(|| Finding::new(Kind::NotObserved, text, figures))
+}
+
+/// The finding on requested constants of the table and of error terms, if any.
+fn constants_not_observed(constants: Vec<String>) -> Option<Finding> {
+    let text = format!(
+        "This path does not determine these constants of the table or of error terms, which keep their stated \
+         values: {}. The σ of K, E and D include their uncertainty. Add dwells at other table angles, or leave the \
+         terms out.",
+        listed(&constants)
+    );
+    let figures = json!({ "by": "this path", "parameters": constants });
+    let finding = || Finding::new(Kind::NotObserved, text, figures).at(Level::Note);
+    (!constants.is_empty()).then(finding)
 }
 
 /// The finding on parameters whose temperature dependence the recordings do not show, if any.
@@ -96,7 +140,7 @@ fn heading(sigma_rad: f64) -> Finding {
 /// The finding that second order and asymmetry of the accelerometers cannot be distinguished.
 fn even_terms() -> Finding {
     let text = "The second-order and asymmetry terms of the accelerometers have the same effect in dwells with an \
-        axis up or down. Add dwells at about 45°, or switch off one of the two terms.";
+        axis up or down. Add dwells at about 45°, or leave one of the two terms out of --with.";
     Finding::new(Kind::EvenTermsInseparable, text.to_owned(), json!(null))
 }
 

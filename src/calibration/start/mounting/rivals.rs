@@ -16,9 +16,8 @@ use crate::imu::{AxisOrder, PerSensor, Sensor};
 use crate::run::Run;
 use crate::statistics::median;
 
-/// Sensitivities from a tenth to ten times the stated one are tested (beyond the next two ranges of an instrument);
-/// wrong units are detected by their nominal scale when run.toml is read.
-const WIDEST: f64 = 10.0;
+/// Sensitivities from a hundredth to a hundred times the stated one are tested: a radian is 57 degrees.
+const WIDEST: f64 = 100.0;
 /// Each tested sensitivity is this many times the previous one, so that the residual rotation between two of them is in
 /// the linear range.
 const STEP: f64 = 1.1;
@@ -84,7 +83,8 @@ impl Contradiction {
                 let (rival, motion) = rival(factor);
                 Weighed::of(problem, &rival, &motion).explains(least)
             };
-            let is_told = factors.len() <= 1 + OTHERS && is_another(run, Sensor::Gyro, factor);
+            let is_another = stated.is_nothing || is_another(run, Sensor::Gyro, factor);
+            let is_told = factors.len() <= 1 + OTHERS && is_another;
             (is_told && is_likely()).then(|| Sensitivity::of(run, Sensor::Gyro, axes, factors))
         });
         let sensitivity = sensitivity.map(Self::Sensitivity);
@@ -128,7 +128,7 @@ fn by_magnitude(run: &Run, motion: &Motion) -> Option<(Axes, f64)> {
     );
     // With each axis up and down in some dwell, all eigenvalues are of similar size.
     let eigen = normal.symmetric_eigenvalues();
-    let of_axes = (eigen.min() > eigen.max() / WIDEST.powi(2))
+    let of_axes = (eigen.min() > eigen.max() / WIDEST)
         .then(|| normal.cholesky())
         .flatten()
         .map(|normal| {

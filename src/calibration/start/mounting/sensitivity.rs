@@ -85,7 +85,7 @@ impl Sensitivity {
         };
         if let Some(lasts) = lasts.filter(|_| self.axes == Axes::All) {
             causes.push(format!(
-                "sample_period_s or time_unit (if a row lasts {} times as long as stated)",
+                "sample_period_s, --rate or time_unit (if a row lasts {} times as long as stated)",
                 three_digits(lasts)
             ));
         }
@@ -104,7 +104,7 @@ impl fmt::Display for Sensitivity {
         match self.sensor {
             Sensor::Gyro => write!(
                 f,
-                "the turns fit only if {} {are} {times} times as sensitive as run.toml states",
+                "the turns fit only if {} {are} {times} times as sensitive as stated",
                 self.named("the gyros")
             )?,
             Sensor::Accel => write!(
