@@ -15,7 +15,7 @@ pub fn skew(v: Vector3<f64>) -> Matrix3<f64> {
 #[inline]
 pub fn exp(v: Vector3<f64>) -> Matrix3<f64> {
     let angle2 = v.norm_squared();
-    // The series' next terms are below rounding here; most samples at 100 Hz and more end up in it.
+    // Here the next terms of the series are below rounding; most samples at 100 Hz or more take this branch.
     let (s, c) = if angle2 < 1e-4 {
         (
             1.0 - angle2 / 6.0 * (1.0 - angle2 / 20.0 * (1.0 - angle2 / 42.0)),
@@ -92,7 +92,7 @@ pub fn from_pitch_roll_heading(pitch: f64, roll: f64, heading: f64) -> Matrix3<f
 /// Pitch, roll and heading in radians of `C_b_n`, the inverse of [`from_pitch_roll_heading`]. Pitch is
 /// within ±π/2, the others within ±π; at a pitch of ±π/2, roll and heading cannot be distinguished.
 pub fn to_pitch_roll_heading(c: &Matrix3<f64>) -> [f64; 3] {
-    // The hypotenuse keeps digits near ±π/2 that an arcsine loses.
+    // Near ±π/2, the hypotenuse keeps digits that would be lost with an arcsine.
     [
         c[(2, 1)].atan2(c[(2, 0)].hypot(c[(2, 2)])),
         (-c[(2, 0)]).atan2(c[(2, 2)]),
@@ -104,7 +104,7 @@ pub fn to_pitch_roll_heading(c: &Matrix3<f64>) -> [f64; 3] {
 pub fn tilt(direction: &Vector3<f64>) -> Vector3<f64> {
     let across = direction.cross(&Vector3::z());
     let angle = across.norm().atan2(direction.z);
-    // Head over heels has no smallest turn; any will do.
+    // Upside down, there is no smallest rotation; any half turn will do.
     across.try_normalize(0.0).unwrap_or(Vector3::x()) * angle
 }
 
@@ -119,9 +119,9 @@ pub fn level(up: &Vector3<f64>) -> Matrix3<f64> {
     ])
 }
 
-/// The rotation by a tilt about East and North and then by a heading about Up, the components of an
-/// attitude error φ in rad. If both are small, it is `exp([φ×])`. A heading error does not affect gravity, and here
-/// even a large heading leaves the tilt unchanged.
+/// The rotation by a tilt about East and North and then by a heading about Up, the components of an attitude error φ in
+/// rad. If both are small, it is `exp([φ×])`. A heading error does not affect gravity, and in this form even a large
+/// heading error leaves the tilt unchanged.
 pub fn from_tilt_and_heading(error: &Vector3<f64>) -> Matrix3<f64> {
     exp(Vector3::z() * error.z) * exp(Vector3::new(error.x, error.y, 0.0))
 }

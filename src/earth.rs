@@ -106,7 +106,7 @@ pub struct Site {
     pub height: f64,
     /// Magnitude of gravity in m/s², including the centrifugal part.
     pub gravity: f64,
-    /// 1σ in m/s². The scale factors of all three accelerometers share the error of gravity.
+    /// 1σ in m/s². The scale factors of all three accelerometers share the gravity error.
     pub gravity_sigma: f64,
     /// Whether the site is known; otherwise Earth rotation is zero with the σ of [`Site::earth_rate_sigma`].
     #[serde(default = "known")]
@@ -131,7 +131,7 @@ const FREE_AIR: f64 = 0.3086 * MILLIGAL;
 const ANYWHERE: (f64, f64) = (9.806, 0.015);
 
 impl Site {
-    /// An unknown site on the Earth, with the latitude of mean gravity where a latitude is needed.
+    /// An unknown site on the Earth; if a latitude is needed, it is that of mean gravity.
     pub fn unknown() -> Self {
         let (gravity, gravity_sigma) = ANYWHERE;
         Self {
@@ -144,7 +144,7 @@ impl Site {
         }
     }
 
-    /// A site with normal gravity, whose σ is the usual anomaly.
+    /// A site with normal gravity; its σ is the usual anomaly.
     pub fn with_normal_gravity(latitude: f64, longitude: f64, height: f64) -> Self {
         Self {
             latitude,
@@ -156,7 +156,7 @@ impl Site {
         }
     }
 
-    /// A site of which the latitude, the height or both may be unknown; gravity then has a larger σ.
+    /// A site whose latitude or height, or both, may be unknown; gravity then has a larger σ.
     pub fn of_knowledge(latitude: Option<f64>, longitude: f64, height: Option<f64>) -> Self {
         let mut site = match latitude {
             Some(latitude) => Self::with_normal_gravity(latitude, longitude, height.unwrap_or(0.0)),

@@ -1,4 +1,4 @@
-//! Statements of a calibration laboratory about itself, its customer and the item. They do not follow from data; a
+//! Statements of a calibration laboratory about itself, its customer and the item. They are not derived from data; a
 //! certificate shows them.
 
 use serde::Deserialize;
@@ -100,7 +100,7 @@ impl Place {
         }
     }
 
-    /// In words.
+    /// The place in words.
     pub fn words(self) -> &'static str {
         match self {
             Self::Laboratory => "in the laboratory",
@@ -115,7 +115,7 @@ impl Place {
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Condition {
-    /// In the unit of its field.
+    /// Value, in the unit of its field.
     pub value: f64,
     /// Expanded uncertainty, k = 2.
     pub uncertainty: f64,
@@ -144,7 +144,7 @@ pub enum DecisionRule {
 }
 
 impl DecisionRule {
-    /// In words.
+    /// The rule in words.
     pub fn words(self) -> &'static str {
         match self {
             Self::GuardBand => {
@@ -182,7 +182,7 @@ pub struct Laboratory {
     /// Decision rule for conformity.
     #[serde(default)]
     pub decision: DecisionStated,
-    /// Anything else.
+    /// Other remarks.
     pub remarks: Option<String>,
 }
 
@@ -228,7 +228,7 @@ pub struct Item {
 pub struct Method {
     /// Procedure of the laboratory.
     pub procedure: String,
-    /// Additions to, deviations or exclusions from it.
+    /// Additions to the procedure, deviations or exclusions from it.
     pub deviations: Option<String>,
 }
 
@@ -246,7 +246,7 @@ pub struct Conditions {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Traceability {
-    /// In the words of the laboratory.
+    /// Statement in the laboratory's own words.
     pub statement: String,
     /// Equipment that provides it.
     #[serde(default)]
@@ -257,7 +257,7 @@ pub struct Traceability {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Authorised {
-    /// Who.
+    /// Name.
     pub name: String,
     /// The function.
     pub function: String,

@@ -40,8 +40,7 @@
 //! | parameter errors | true − estimated |
 //! | units | SI and radians everywhere; [`units`] are for input and output |
 //!
-//! # Rooms
-//! A [`recording::Recording`] holds only data. A [`run::Run`] adds prior knowledge: instrument, site, table.
+//! # Modules A [`recording::Recording`] holds only data. A [`run::Run`] adds prior knowledge: instrument, site, table.
 //! [`calibration::Options`] select the estimated quantities; a [`calibration::Problem`] preprocesses all of it once.
 //! Data flow in one direction: [`calibration`] solves, [`study`] evaluates by navigation and Monte Carlo, [`lot`] compares
 //! units of one type. [`earth`], [`attitude`], [`imu`], [`turntable`] and [`navigation`] do not depend on these;
@@ -50,9 +49,9 @@
 //! # Crates
 //! This crate is the science: it reads no recording, prints nothing and draws nothing.
 //!
-//! | crate | what it does | what it knows |
+//! | crate | purpose | depends on |
 //! |---|---|---|
-//! | `turncal-input` | errors that name line and field, TOML documents, checked numbers, units | |
+//! | `turncal-input` | errors with line and field, TOML documents, checked numbers, units | |
 //! | `turncal` | calibrates, simulates, studies | `turncal-input` |
 //! | `turncal-logs` | turns logs into rows of numbers | `turncal-input` |
 //! | `turncal-files` | reads and writes runs and calibrations, drafts a `run.toml`, exports | all above |

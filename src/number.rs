@@ -73,7 +73,7 @@ pub fn to_twelve_digits(x: f64) -> f64 {
     format!("{x:.11e}").parse().unwrap_or(x)
 }
 
-/// A number as it was stated, without the rounding errors of a change of unit.
+/// A number as stated, without rounding errors of a unit conversion.
 pub fn stated(x: f64) -> String {
     plain(to_twelve_digits(x))
 }
@@ -113,7 +113,7 @@ pub fn with_interval(of: f64, (low, high): (f64, f64)) -> [String; 2] {
     [value(of, 0.5 * (high - low)), interval((low, high))]
 }
 
-/// A value with its 1σ; to three digits if it has none.
+/// A value with its 1σ; to three digits if there is no σ.
 pub fn plus_minus(of: f64, own: f64) -> String {
     if own <= 0.0 {
         return three_digits(of);

@@ -9,7 +9,7 @@ use statrs::statistics::{Data, OrderStatistics};
 /// False-alarm rate of a whole list of checks, divided among them.
 pub const FALSE_ALARM: f64 = 1e-3;
 
-/// σ of a normal distribution over the median of its absolute deviations.
+/// σ of a normal distribution, divided by the median of its absolute deviations.
 pub const SIGMA_OF_MEDIAN: f64 = 1.482_602;
 
 /// The limit that χ² with these degrees of freedom exceeds with probability `chance`; infinite for zero degrees of
@@ -50,8 +50,7 @@ pub fn ln_survival(freedom: f64, x: f64) -> f64 {
 /// Degrees of freedom above which t equals the normal distribution with its first correction, to 1e-7.
 const MANY: f64 = 1e4;
 
-/// The limit that Student's t exceeds with probability `chance`, which is below one half; `degrees` of freedom are at
-/// least one.
+/// The limit that Student's t exceeds with probability `chance` (below one half), for at least one degree of freedom.
 ///
 /// The limit is found by bisection, because Newton's method does not converge for some degrees of freedom. Source:
 /// Abramowitz and Stegun, *Handbook of Mathematical Functions*, 26.7.1 and 26.7.5.

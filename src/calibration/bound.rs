@@ -20,7 +20,7 @@ pub struct Bound {
     pub history: Vec<Epoch>,
     /// Prior 1σ of the parameters.
     pub prior_sigma: ParameterVector,
-    /// Combinations of parameters that the record determines.
+    /// Combinations of parameters that the recording determines.
     pub observability: Observability,
 }
 
@@ -29,18 +29,17 @@ pub struct Bound {
 pub struct TermLeftOff {
     /// The term.
     pub term: ErrorTerm,
-    /// Largest remaining part of the prior σ of any combination of its parameters, if it were estimated with its usual
-    /// σ: from 0 (known) to 1 (not observed).
+    /// Remaining fraction of the prior σ, for the combination of its parameters with the largest fraction, if the term
+    /// were estimated with its usual σ: from 0 (known) to 1 (not observed).
     pub remaining: f64,
     /// 1σ of the change of each parameter if the term has its usual size.
     pub change: ParameterVector,
 }
 
-/// The covariance of a chain linearised at the truth, with the noise and the error terms of the problem as stated and with
-/// `terms` the true ones, in the misalignment form of the truth: the inverse of the Bayesian information matrix for
-/// Gaussian noise (Van Trees, *Detection, Estimation, and Modulation Theory*, part I, §2.4.3). The initial attitude is
-/// that of the first reading or the coarse start: arc seconds of tilt and arc minutes of heading have no effect on the
-/// covariance.
+/// The covariance of a chain linearised at the truth, with the stated noise and error terms of the problem and the true
+/// `terms`, in the misalignment form of the truth: the inverse of the Bayesian information matrix for Gaussian noise
+/// (Van Trees, *Detection, Estimation, and Modulation Theory*, part I, §2.4.3). The initial attitude is that of the
+/// first reading or the coarse start: arc seconds of tilt and arc minutes of heading have no effect on the covariance.
 ///
 /// # Errors
 /// [`CalibrationError`] as for [`super::estimate`].
@@ -90,7 +89,7 @@ pub fn bound_without_moves(
     Ok((bound, filtered.without_moves(posterior)))
 }
 
-/// The constant error terms that a problem does not estimate, at a truth as for [`bound`].
+/// The constant error terms that a problem does not estimate, linearised at a truth as for [`bound`].
 ///
 /// # Errors
 /// [`CalibrationError`] as for [`super::estimate`].
@@ -129,7 +128,7 @@ fn at_truth<'a>(problem: &Problem<'a>, truth: &PerSensor<Triad>) -> Problem<'a> 
     problem.with(|model| *model = model.in_form(problem.run(), truth.gyro.form))
 }
 
-/// Events at a truth.
+/// Events, linearised at a truth.
 fn script(problem: &Problem, truth: Linearisation) -> Result<Script, CalibrationError> {
     let attitudes = initial_attitudes(problem)?;
     let at = Linearisation {

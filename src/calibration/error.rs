@@ -45,7 +45,7 @@ pub enum CalibrationError {
          check the prior gyro bias and the noise figures"
     )]
     NoDwells,
-    /// A prior with σ of zero, or a diverged estimate.
+    /// A prior with a σ of zero, or a diverged estimate.
     #[error(
         "the {} data contradict [imu.prior.{0}] (the fit diverged: K·C became singular). Check scale and units \
          there. Also check for dead, stuck or wrapped axes, lost rows, and a table log from a different run",
@@ -116,7 +116,7 @@ pub enum ComparisonError {
         name: String,
         /// Unit.
         expected: String,
-        /// The record that states another one.
+        /// The record that states another unit.
         other: String,
         /// The other unit.
         found: String,
@@ -135,7 +135,7 @@ pub enum ComparisonError {
         /// The axis.
         axis: char,
     },
-    /// Mismatch of `parameters` and `covariance`.
+    /// `parameters` and `covariance` do not match.
     #[error(
         "{name}: covariance needs one row and one column per entry of parameters, and each entry must be a parameter \
          of the misalignment form. Write the calibration again"

@@ -42,7 +42,7 @@ impl Estimate {
         }
     }
 
-    /// Indices of the parameters that keep more than half of these prior σ.
+    /// Indices of the parameters whose σ is still more than half of these prior σ.
     pub fn unobserved(&self, prior_sigma: &ParameterVector) -> Vec<usize> {
         let sigma = self.sigma();
         let hidden = |&index: &usize| {
@@ -76,7 +76,7 @@ impl Estimate {
         self.covariance.diagonal().map(|v| v.max(0.0).sqrt())
     }
 
-    /// Joint covariance of the parameters and of further constants, from the covariance of these and the
+    /// Joint covariance of the parameters and of further constants, from the covariance of the constants and the
     /// cross-covariance.
     pub fn covariance_with<'a>(
         &self,

@@ -9,9 +9,9 @@ use crate::calibration::{
 
 /// Estimates both triads from zero velocity in dwells and, if observed, the attitude of the table.
 ///
-/// Each pass navigates once, linearised at the estimate before, and solves the chain of its dwells with the likeliest
-/// sizes of all effects: a Gauss–Newton step on all data. Source: after Maybeck, *Stochastic Models, Estimation and
-/// Control*, vol. 2, §9.7 (iterated, linearised filters).
+/// Each pass navigates once, linearised at the previous estimate, and solves the chain of its dwells with the most
+/// likely sizes of all effects: a Gauss–Newton step on all data. Source: after Maybeck, *Stochastic Models, Estimation
+/// and Control*, vol. 2, §9.7 (iterated, linearised filters).
 ///
 /// # Errors
 /// [`CalibrationError`] if the runs cannot give a calibration. Without convergence, the result is an
@@ -25,10 +25,10 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
     Ok(outcome)
 }
 
-/// Part of the prior σ to which the start determines a parameter.
+/// Fraction of the prior σ to which the start determines a parameter.
 const STARTED: f64 = 0.1;
 
-/// The problem with a prior that its start does not contradict: the error of a wrong one would turn into noise.
+/// The problem with a prior that its start does not contradict; the error of a wrong prior would become noise.
 fn with_wide_prior<'a>(problem: &Problem<'a>, start: &Linearisation) -> Problem<'a> {
     let variances = (problem.model.prior_sigma * STARTED).map(|sigma| sigma.powi(2));
     let started = Estimate {

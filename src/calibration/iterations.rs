@@ -13,14 +13,14 @@ use crate::calibration::{
     Progress, Script, from_vector, to_vector,
 };
 
-/// The sizes are estimated in earnest once no parameter moves by more than this, in σ: before, the misfit is that of the
+/// The sizes are fully estimated once no parameter moves by more than this, in σ; before that, the misfit is due to the
 /// linearisation.
 const NEAR: f64 = 2.0;
-/// After a step longer than this fraction of the one before, all further steps are halved.
+/// After a step longer than this fraction of the previous step, all further steps are halved.
 const SHRINKS: f64 = 0.8;
-/// Steps below this, in σ, are those of the sizes.
+/// Steps below this limit, in σ, are due to changes of the sizes.
 const SMALL: f64 = 0.2;
-/// Most halvings of a step that leads nowhere: to a thousandth.
+/// Maximum number of halvings of a failing step: to a thousandth.
 const MOST_SHORTENED: usize = 10;
 
 /// A problem whose iterations have ended.
@@ -41,7 +41,8 @@ pub struct Solved {
 /// Iterates from a starting point, with these priors of the initial attitudes.
 ///
 /// # Errors
-/// [`CalibrationError`] if no pass is possible at the start. Without convergence, the result says so.
+/// [`CalibrationError`] if no pass is possible at the start. If the iterations do not converge, the result is marked as
+/// not converged.
 pub fn solve(
     problem: &Problem,
     (start, priors): (&Linearisation, &[AttitudePrior]),
@@ -64,7 +65,7 @@ pub fn solve(
         let mut solved = match (solved, before) {
             (Ok(solved), _) => solved,
             (Err(error), None) => return Err(error),
-            // Where a step leads nowhere, a shorter one is made.
+            // If a step fails, a shorter one is tried.
             (Err(_), Some(last)) if shortened < MOST_SHORTENED => {
                 shortened += 1;
                 at = last.script.at.towards(&at, 0.5);
@@ -95,7 +96,7 @@ pub fn solve(
     }
 }
 
-/// One pass: navigates, makes the sizes likelier, and solves the chain.
+/// One pass: navigates, improves the sizes, and solves the chain.
 fn one_pass(
     problem: &Problem,
     (at, priors): (&Linearisation, &[AttitudePrior]),
@@ -125,7 +126,7 @@ fn one_pass(
     })
 }
 
-/// Largest step of any parameter, in σ; a step that is no number is no step to end with.
+/// Largest step of any parameter, in σ; a step that is not a number does not end the iterations.
 fn largest(posterior: &Posterior) -> f64 {
     let variance = posterior.parameter_covariance.diagonal();
     let steps = posterior.parameters.iter().zip(&variance);

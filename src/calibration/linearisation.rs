@@ -30,7 +30,7 @@ pub struct Linearisation {
     pub own: Vec<Difference>,
     /// `C_b_n` at the first sample of each stretch.
     pub initial_attitudes: Vec<Matrix3<f64>>,
-    /// `C_b_n` where each dwell begins, whatever the table reads; empty at the start.
+    /// `C_b_n` at the beginning of each dwell, whatever the table reads; empty in the first pass.
     pub dwells: Vec<Matrix3<f64>>,
 }
 
@@ -123,7 +123,7 @@ pub fn not_invertible(triads: &PerSensor<Triad>) -> Option<Sensor> {
     Sensor::ALL.into_iter().find(singular)
 }
 
-/// The error that names the triad whose sensitivity is singular.
+/// The error for the triad whose sensitivity is singular.
 pub fn singular(triads: &PerSensor<Triad>) -> CalibrationError {
     CalibrationError::Singular {
         sensor: not_invertible(triads).unwrap_or(Sensor::Gyro),
@@ -138,18 +138,18 @@ pub struct AttitudePrior {
     /// 1σ about East, North and Up, rad; the last is that of the heading.
     pub sigma: Vector3<f64>,
     /// 1σ of Earth rate along East, North and Up of this attitude, rad/s. If the heading is unknown, the heading is
-    /// fixed and Earth rate has any horizontal direction; if the site is unknown, any direction. Otherwise zero.
+    /// fixed and Earth rate has any horizontal direction; if the site is unknown, any direction. Otherwise, zero.
     pub earth_rate_sigma: Vector3<f64>,
 }
 
-/// 1σ of an initial attitude known from one reading only, which may be wrong, rad.
+/// 1σ of an initial attitude known from only one reading (which may be wrong), rad.
 const READ_ATTITUDE: f64 = DEGREE;
 /// σ of the initial level without a table, divided by its σ from the accelerometer prior: the data that gave this level
 /// are also observations and must determine it.
 const LEVEL_SIGMAS: f64 = 10.0;
 /// 1σ of the initial heading without a table, rad, if Earth rate determines the heading well.
 const HEADING: f64 = 15.0 * DEGREE;
-/// Otherwise, 1σ of the initial heading without a table, divided by its σ from Earth rate.
+/// If it does not: 1σ of the initial heading without a table, divided by its σ from Earth rate.
 const HEADING_SIGMAS: f64 = 3.0;
 /// A heading with a larger σ than this, rad, is treated as unknown and fixed.
 const HIDDEN: f64 = 45.0 * DEGREE;
@@ -164,9 +164,9 @@ impl AttitudePrior {
         self.sigma.z == FIXED
     }
 
-    /// Prior from a reading of a table.
+    /// Prior from a table reading.
     pub(in crate::calibration) fn of_reading(table: &TableAccuracy, mean: Matrix3<f64>) -> Self {
-        // The one reading that gave it has all errors.
+        // The single reading that gave the attitude contains all errors.
         let known = table.position_sigma.hypot(table.reading_sigma);
         let known = known.hypot(table.geometry.base.max());
         Self {

@@ -38,7 +38,7 @@ pub struct Model {
     pub aiding: Aiding,
     /// Mean of the parameters of both triads.
     pub prior_mean: ParameterVector,
-    /// 1σ of each; zero for those that the form does not have or the body frame fixes.
+    /// 1σ of each parameter; zero for parameters that the form does not have or the body frame fixes.
     pub prior_sigma: ParameterVector,
     /// Noise of each triad.
     pub noise: PerSensor<Noise>,
@@ -47,14 +47,14 @@ pub struct Model {
     /// White 1σ, at standstill, of the integral of each triad's output: attitude in rad, velocity in m/s; `None`: in
     /// each stretch, the value stated in or estimated from its run.
     pub standstill_sigma: PerSensor<Option<f64>>,
-    /// Unwanted rotation of the body in dwells without a table: 1σ density of a random walk,
-    /// rad/√s. Gyros sense it, so it is not part of their noise.
+    /// Unwanted rotation of the body in dwells without a table: 1σ density of a random walk, rad/√s. The gyros sense
+    /// this rotation, so it is not part of their noise.
     pub turning_at_rest: f64,
-    /// 1σ of each parameter of the instrument's error terms, around zero; zero if a term is off.
+    /// 1σ of each error-term parameter, with mean zero; 0 if a term is off.
     pub term_sigma: TermVector,
     /// Error terms that may be absent; the estimate averages over their sizes.
     pub may_have: Vec<ErrorTerm>,
-    /// Whether the latitude may differ from the stated one, which only a table shows.
+    /// Whether the latitude may differ from the stated one (only a table shows this).
     pub may_be_elsewhere: bool,
     /// Temperature dependence of the instrument, if any.
     pub thermal: Option<Arc<ThermalModel>>,
@@ -142,7 +142,7 @@ impl Model {
         })
     }
 
-    /// Part of the settling of a table that is left after a time.
+    /// Fraction of the settling of a table that remains after a time.
     pub(in crate::calibration) fn settling(&self, duration: f64) -> f64 {
         (-duration / self.settling_time).exp()
     }

@@ -24,7 +24,7 @@ pub struct Options {
     pub aiding: Option<Aiding>,
     /// Error terms to estimate in addition to those with a σ stated for instrument or table.
     pub terms: Vec<ErrorTerm>,
-    /// Whether all other error terms are averaged over being absent and their usual sizes.
+    /// Whether the estimate is averaged over the absence and the usual sizes of all other error terms.
     pub auto_terms: bool,
     /// Noise policy.
     pub noise: NoisePolicy,
@@ -75,7 +75,7 @@ impl Options {
         }
     }
 
-    /// Adds this error term, whatever the data say of it, with a wide σ unless instrument or table state another.
+    /// Adds this error term, whatever the data indicate, with a wide σ unless instrument or table state another.
     pub fn with(mut self, term: ErrorTerm) -> Self {
         self.terms.push(term);
         self

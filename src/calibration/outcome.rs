@@ -42,7 +42,7 @@ pub struct Outcome {
     /// Posterior 1σ of the initial attitude of the last stretch about East, North and Up, rad; the last is that of the
     /// heading.
     pub attitude_sigma: Vector3<f64>,
-    /// Errors of the table's geometry and parameters of the instrument's error terms, as far as certain or requested.
+    /// Errors of the table's geometry and parameters of the instrument's error terms, if certain or requested.
     pub auxiliary: Auxiliary,
     /// Temperature dependence of the parameters, if any.
     pub thermal: Option<Thermal>,
@@ -197,7 +197,7 @@ fn with_all_parts(problem: &Problem, solved: &Solved) -> Estimate {
     estimate
 }
 
-/// Parts of the covariance that do not come from the chain: rounding and sample period.
+/// Parts of the covariance that are not from the chain: rounding and sample period.
 pub fn beside(problem: &Problem, estimate: &Estimate) -> [ParameterMatrix; 2] {
     [
         by_rounding(problem, &estimate.triads),

@@ -74,7 +74,7 @@ impl<'a> Problem<'a> {
         with
     }
 
-    /// Some of its recordings, at least one, selected by number.
+    /// The problem with some of its recordings (at least one), selected by number.
     pub(in crate::calibration) fn recordings(&self, which: impl Fn(usize) -> bool) -> Self {
         let renumbered = self.stretches.iter().filter(|of| which(of.recording));
         let renumbered = renumbered.map(|stretch| Stretch {
@@ -89,7 +89,7 @@ impl<'a> Problem<'a> {
         of
     }
 
-    /// The problem without recordings that have no dwell, which are reported; unchanged if none has a dwell.
+    /// The problem without recordings that have no dwell (these are reported); unchanged if no recording has a dwell.
     pub(in crate::calibration) fn of_dwells(self) -> Self {
         let has = |number: usize| {
             let mut of = self.stretches.iter().filter(|of| of.recording == number);
@@ -210,7 +210,7 @@ impl<'a> Problem<'a> {
         doubts.map(Finding::of_statement).chain(notes).collect()
     }
 
-    /// Sentences about recordings, each once, with the names of the recordings concerned, unless all are.
+    /// Sentences about recordings, each once, with the names of the recordings concerned (no names if all are).
     fn of_recordings(&self, of: impl Fn(&Recording) -> &Vec<String>) -> Vec<String> {
         let mut found: Vec<(&String, Vec<&str>)> = Vec::new();
         for run in self.runs() {
@@ -249,7 +249,7 @@ impl<'a> Problem<'a> {
         there.map(|(kind, _)| kind)
     }
 
-    /// The kinds of observation in which remainders of pulses are.
+    /// The kinds of observation that contain remainders of pulses.
     pub(in crate::calibration) fn with_pulses(&self) -> Vec<Observation> {
         let any = |kind: &Observation| {
             self.runs()
@@ -310,7 +310,7 @@ impl<'a> Stretch<'a> {
         self.run.standstill.position_sigma.powi(2) * model.weight(BudgetSource::Place)
     }
 
-    /// White 1σ at standstill that the filter uses, of attitude in rad (gyros) or velocity in m/s.
+    /// White 1σ at standstill used by the filter, of attitude in rad (gyros) or velocity in m/s.
     pub fn standstill_sigma(&self, model: &Model, sensor: Sensor) -> f64 {
         let of_model = *model.standstill_sigma.get(sensor);
         of_model.unwrap_or(*self.standstill_sigma.get(sensor))
@@ -343,7 +343,7 @@ impl<'a> Stretch<'a> {
             attitude_sigma: prior.sigma,
             velocity_sigma: self.velocity_sigma(),
             position_sigma: self.run.standstill.position_sigma,
-            // Where it may point anywhere its mean is zero, whatever was taken for it.
+            // If Earth rate may point in any direction, its mean is zero, whatever value was assumed.
             earth_rate: -self.run.site.earth_rate_n().zip_map(
                 &prior.earth_rate_sigma,
                 |taken, sigma| {

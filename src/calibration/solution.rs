@@ -17,7 +17,7 @@ pub enum Solution {
     ClosedForm(Box<ClosedForm>),
 }
 
-/// Assessment of a solution and of its model by the data.
+/// Assessment of a solution and its model against the data.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Assessment {
     /// Residuals of gravity and turns.
@@ -116,7 +116,7 @@ impl Solution {
                 );
                 Ok(Assessment {
                     quality: quality?,
-                    // A calibration is one without its budget, too.
+                    // The calibration is usable even without its budget.
                     budget: budget.ok(),
                 })
             }

@@ -18,18 +18,18 @@ impl AxisOrder {
         reversed: [false; 3],
     };
 
-    /// From front, right, down to right, front, up.
+    /// The order from front, right, down to right, front, up.
     pub const FRONT_RIGHT_DOWN: Self = Self {
         source: [1, 0, 2],
         reversed: [false, false, true],
     };
-    /// From front, left, up to right, front, up.
+    /// The order from front, left, up to right, front, up.
     pub const FRONT_LEFT_UP: Self = Self {
         source: [1, 0, 2],
         reversed: [true, false, false],
     };
 
-    /// All 48, the first being the identity.
+    /// All 48 axis orders, the identity first.
     pub fn all() -> impl Iterator<Item = Self> {
         const ORDERS: [[usize; 3]; 6] = [
             [0, 1, 2],
@@ -57,8 +57,8 @@ impl AxisOrder {
         Vector3::from_fn(|axis, _| self.sign(axis) * v[self.source[axis]])
     }
 
-    /// One value per axis, such as a σ or a nominal scale, which is independent of sign: a reversed axis changes the
-    /// sign of both input and output.
+    /// Rearranges one value per axis, such as a σ or a nominal scale. The value is independent of sign, because a
+    /// reversed axis changes the sign of both input and output.
     pub fn each(&self, v: Vector3<f64>) -> Vector3<f64> {
         Vector3::from(self.source.map(|axis| v[axis]))
     }

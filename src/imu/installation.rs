@@ -19,9 +19,9 @@ pub enum InstallationForm {
     ThreeAngle,
 }
 
-/// Off-diagonal places in the order of the parameters.
+/// Off-diagonal positions in the order of the parameters.
 const SIX: [(usize, usize); 6] = [(0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1)];
-/// `E_yz`, `E_xz`, `E_xy` are `e` in Eq. 10, and the names say which pair of axes they couple.
+/// `E_yz`, `E_xz`, `E_xy` are `e` in Eq. 10; the names give the pair of axes that they couple.
 const THREE: [(usize, usize); 3] = [(1, 2), (0, 2), (0, 1)];
 
 impl InstallationForm {
@@ -37,7 +37,7 @@ impl InstallationForm {
         }
     }
 
-    /// Row and column that name each angle (`gyro.installation.xy` is row x, column y).
+    /// Row and column in the name of each angle (`gyro.installation.xy` is row x, column y).
     pub fn angle_names(self) -> &'static [(usize, usize)] {
         match self {
             Self::General | Self::SixAngle => &SIX,
@@ -50,7 +50,7 @@ impl InstallationForm {
         self == other || self != Self::ThreeAngle
     }
 
-    /// Derivative of the off-diagonal entries of `C`, which are linear in the angles, by one angle.
+    /// Derivative of the off-diagonal entries of `C` (linear in the angles) with respect to one angle.
     fn slope(self, angle: usize) -> Matrix3<f64> {
         let (row, column) = self.angle_names()[angle];
         let mut slope = Matrix3::zeros();
@@ -74,8 +74,8 @@ impl InstallationForm {
         }
         for row in 0..3 {
             c[(row, row)] = match self {
-                // Beyond a right angle no row of unit norm exists; a filter's step that
-                // far is caught by its cost, not here.
+                // Beyond a right angle, no row of unit norm exists; a filter step that large is rejected because of its
+                // cost, not here.
                 Self::General => (1.0 - c.row(row).norm_squared()).max(0.0).sqrt(),
                 Self::SixAngle | Self::ThreeAngle => 1.0,
             };

@@ -1,9 +1,9 @@
 //! The instrument: output of a triad of gyros or accelerometers as a function of its input.
 //!
-//! `N = K C u + D` (Zhao, Jiang, Li 2016, Eq. 6; the second line of the printed Eq. 6 says `N_g` where the
-//! accelerometer is meant). `u` is the angular rate in rad/s or the specific force in m/s² along the body axes, `K`
-//! diagonal, `C` the misalignment matrix, `N` the output per second. Inside the crate `N` is divided by the nominal
-//! scale of its axis, so that `K ≈ 1` and `D` is in rad/s or m/s²; [`Nominal`] converts back on input and output.
+//! `N = K C u + D` (Zhao, Jiang, Li 2016, Eq. 6; in the second line of the printed Eq. 6, `N_g` means the
+//! accelerometer). `u` is the angular rate in rad/s or the specific force in m/s² along the body axes, `K` diagonal,
+//! `C` the misalignment matrix, `N` the output per second. Inside the crate `N` is divided by the nominal scale of its
+//! axis, so that `K ≈ 1` and `D` is in rad/s or m/s²; [`Nominal`] converts back on input and output.
 
 mod axis_order;
 mod body_frame;

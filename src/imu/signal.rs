@@ -49,8 +49,8 @@ pub struct MotionNoise {
 }
 
 impl MotionNoise {
-    /// Noise of moves by hand: 0.05° (1σ) in a quarter turn of 1.5 s, the size that records of MEMS sensors turned by
-    /// hand show (bandwidth, timing and second-order effects of the sensor).
+    /// Noise of moves by hand: 0.05° (1σ) in a quarter turn of 1.5 s, as found in recordings of MEMS sensors turned by
+    /// hand (bandwidth, timing and second-order effects of the sensor).
     pub const BY_HAND: Self = Self {
         by_motion: 7e-4,
         by_duration: 0.0,
@@ -76,8 +76,8 @@ impl Noise {
         let white = self.random_walk.powi(2) * overlap;
         let bias = self.gauss_markov.map_or(0.0, |gauss_markov| {
             let (sigma, tau) = (gauss_markov.sigma, gauss_markov.correlation_time);
-            // Between the spans each integral is a factor: nothing is lost of spans that are long or far
-            // apart.
+            // The double integral is a product of one integral per span, so no digits are lost if the spans are long or
+            // far apart.
             let mut spans = [one, other];
             spans.sort_by(|a, b| a[0].total_cmp(&b[0]));
             let [first, second] = spans;

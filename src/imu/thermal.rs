@@ -109,7 +109,7 @@ impl Triad {
     pub fn warmed(&self, coefficients: &ThermalCoefficients, values: &[ThermalValues; 3]) -> Self {
         let mut v = self.to_vector();
         for (parameter, of) in coefficients.row_iter().enumerate() {
-            // A parameter follows the temperature of the axis whose output it is of.
+            // A parameter follows the temperature of the axis whose output it affects.
             if let Some(axis) = Self::axis(self.form, parameter) {
                 v[parameter] += of.transpose().dot(&values[axis]);
             }
@@ -123,7 +123,7 @@ impl Triad {
 pub struct ThermalModel {
     /// Temperature range of each triad's polynomials.
     pub range: PerSensor<ThermalRange>,
-    /// Prior 1σ of every coefficient, around zero; zero if it is off.
+    /// Prior 1σ of every coefficient, with mean zero; 0 if it is off.
     pub sigma: PerSensor<ThermalCoefficients>,
 }
 

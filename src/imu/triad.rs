@@ -64,7 +64,7 @@ impl Triad {
         Matrix3::from_diagonal(&self.scale) * self.installation()
     }
 
-    /// `A⁻¹`, which turns `N − D` into `u` (Eq. 11); `None` where `A` is singular.
+    /// `A⁻¹`, which converts `N − D` to `u` (Eq. 11); `None` if `A` is singular.
     pub fn correction(&self) -> Option<Matrix3<f64>> {
         self.sensitivity().try_inverse()
     }
@@ -221,8 +221,8 @@ impl Prior {
     }
 }
 
-/// The nominal scale of a triad: the file's quantity per second for one rad/s or one m/s², axis by axis. No other
-/// conversion lies between the numbers in a file and the normalised model.
+/// The nominal scale of a triad: the file's quantity per second for one rad/s or one m/s², axis by axis. There is no
+/// other conversion between the numbers in a file and the normalised model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Nominal(pub Vector3<f64>);
 

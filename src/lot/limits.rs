@@ -20,7 +20,7 @@ pub struct Specification {
 }
 
 impl Specification {
-    /// Largest σ with which a unit at its nominal value passes a limit within this distance.
+    /// Largest σ for which a unit at its nominal value passes a limit at this distance.
     pub fn deciding_sigma(&self, within: f64) -> f64 {
         within / Normal::standard().inverse_cdf(0.5 * (1.0 + self.confidence))
     }
@@ -75,11 +75,11 @@ pub fn probability_outside(off: f64, sigma: f64, within: f64) -> f64 {
     beyond(within - off) + beyond(within + off)
 }
 
-/// Checks a unit against every limit; `value` gives its value of a parameter.
+/// Checks a unit against every limit; `value` returns the value of a parameter.
 pub fn checks(of: &Specification, value: impl Fn(usize) -> Option<Sample>) -> Vec<Check> {
     let check = |&limit: &Limit| {
         let off = value(limit.parameter).map(|of| (of.value - limit.nominal, of.sigma));
-        // Without a σ nothing is known of how near the value is.
+        // Without a σ, the uncertainty of the value is unknown.
         let known = off.filter(|(_, sigma)| *sigma > 0.0);
         let outside = known.map(|(off, sigma)| probability_outside(off, sigma, limit.within));
         let verdict = match outside {

@@ -121,7 +121,7 @@ impl Lot {
         self.statistics.iter().find(|of| of.quantity == quantity)
     }
 
-    /// Origin of differences: the truth or, without a truth, the first of two units.
+    /// Reference for differences: the truth or, without a truth, the first of two units.
     pub fn reference(&self) -> Option<&Row> {
         let first = self.rows.first().filter(|_| self.rows.len() == 2);
         self.truth.as_ref().or(first)
@@ -166,7 +166,7 @@ impl Common {
             .filter_map(|of| of.calibration.unit.as_ref())
             .collect();
         let count = |of: &&PerSensor<String>| stated.iter().filter(|other| *other == of).count();
-        // Of those that are as many the last is taken.
+        // If several are equally common, the last in this order is taken.
         let output = stated.iter().rev().copied().max_by_key(count).cloned();
         let compared = units.filter_map(|unit| usable(unit, output.as_ref()).ok());
         let compared: Vec<&Calibrated> = compared.collect();
@@ -224,7 +224,7 @@ fn usable<'a>(
     }
 }
 
-/// Relative 1σ of gravity, if all units have it from the same site.
+/// Relative 1σ of gravity, if gravity is from the same site for all units.
 fn shared_gravity(rows: &[Row]) -> Option<f64> {
     let usable = rows.iter().filter(|row| row.canonical.is_ok());
     let mut all = usable.filter_map(|row| row.unit.calibrated.as_ref().ok());
@@ -235,7 +235,7 @@ fn shared_gravity(rows: &[Row]) -> Option<f64> {
 
 /// Consistency of the difference of a calibration from the truth with its covariance.
 fn nees_of(own: &Canonical, truth: &Canonical, parameters: &[usize]) -> Option<Nees> {
-    // A truth without σ has no correlations to miss.
+    // A truth without σ needs no correlations.
     let correlated = own.correlated && (truth.correlated || truth.covariance.is_none());
     let covariance = own.covariance.filter(|_| correlated)?;
     let covariance = covariance + truth.covariance.unwrap_or_default();

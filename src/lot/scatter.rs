@@ -21,7 +21,7 @@ pub struct ChiSquare {
     pub value: f64,
     /// Degrees of freedom.
     pub freedom: usize,
-    /// Probability of at least this sum: near zero if σ are too small; near one if they are too large.
+    /// Probability of at least this sum: near zero if the σ are too small; near one if they are too large.
     pub p: f64,
 }
 
@@ -76,7 +76,7 @@ pub fn scatter(samples: &[(f64, f64)]) -> Option<Scatter> {
     let variance = samples.iter().map(|s| (s.0 - centre).powi(2)).sum::<f64>() / n;
     let largest = samples.iter().map(|s| s.1).fold(0.0, f64::max);
     if variance + largest <= 0.0 {
-        // All the same, and without σ.
+        // All values are equal and have no σ.
         return Some(Scatter {
             mean: centre,
             ..Scatter::default()
@@ -114,7 +114,7 @@ fn spread_where(samples: &[(f64, f64)], q: f64, scale: f64) -> f64 {
     while above(high) {
         (low, high) = (high, 2.0 * high);
     }
-    // As many halvings as the digits of a floating-point number, on a logarithmic scale.
+    // Number of halvings on a logarithmic scale that exhausts the digits of a floating-point number.
     for _ in 0..64 {
         let middle = (low * high).sqrt();
         if above(middle) {
@@ -141,7 +141,7 @@ pub fn outliers(samples: &[(f64, f64)], scatter: &Scatter, false_alarm: f64) -> 
     let is_outlier = |&(value, own): &(f64, f64)| {
         let weight = (spread + own).recip();
         let squared = (value - mean).powi(2) * weight / (1.0 - weight / weights);
-        // The scatter of the others, in units of their weights, is not below what their σ make it.
+        // The scatter of the others is not taken to be smaller than their σ imply.
         let scatter = (q - squared) / (n - 2.0);
         let stated = (stated - weight * own) / (n - 1.0);
         squared > limit.powi(2) * scatter.max(stated)

@@ -94,7 +94,7 @@ impl Row {
             Quantity::Parameter(index) => {
                 let sigma = canonical.sigma().map_or(0.0, |sigma| sigma[index]);
                 let value = canonical.vector()[index];
-                // A parameter without σ beside others that have one was not estimated.
+                // A parameter without σ, among others with σ, was not estimated.
                 (sigma > 0.0 || canonical.covariance.is_none()).then_some(Sample { value, sigma })
             }
             Quantity::Auxiliary(index) => {

@@ -29,7 +29,7 @@ impl Embedded {
             .take_while(|line| !line.is_empty())
             .flat_map(str::split_whitespace)
             .collect();
-        // A full stop before a small letter or a number belongs to an abbreviation.
+        // A full stop before a lower-case letter or a number belongs to an abbreviation.
         let begins = |word: &&str| word.starts_with(char::is_uppercase);
         let end = (1..=words.len())
             .find(|&k| words[k - 1].ends_with('.') && words.get(k).is_none_or(begins));

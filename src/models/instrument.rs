@@ -26,7 +26,7 @@ pub struct Instrument {
     pub noise: PerSensor<Noise>,
     /// Variation between instruments of the grade before calibration.
     pub variation: PerSensor<Variation>,
-    /// 1σ of the parameters of its error terms, around zero; zero if it has none.
+    /// 1σ of each error-term parameter, with mean zero; 0 for terms that the instrument does not have.
     pub term_sigma: TermVector,
     /// Error terms that are stated to be absent.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -111,7 +111,7 @@ pub struct InstallationModel {
 }
 
 impl InstallationModel {
-    /// Finds and reads one.
+    /// Finds and reads an installation.
     ///
     /// # Errors
     /// If it does not exist or is malformed.
@@ -143,7 +143,7 @@ impl Instrument {
         }
     }
 
-    /// Finds and reads one.
+    /// Finds and reads an instrument.
     ///
     /// # Errors
     /// If it does not exist or is malformed.

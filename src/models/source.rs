@@ -75,7 +75,7 @@ pub enum ModelError {
         nearest.map_or_else(String::new, |nearest| format!(" (did you mean \"{nearest}\"?)"))
     )]
     Unknown {
-        /// The file that names the model, with a colon; empty for the command line.
+        /// The file that refers to the model, with a colon; empty for the command line.
         named_in: String,
         /// The folder.
         room: &'static str,
@@ -96,7 +96,7 @@ pub fn names(room: Room) -> impl Iterator<Item = &'static str> {
     room.embedded().map(|(name, _)| name)
 }
 
-/// Place where a model is named, which determines how its name is resolved.
+/// Place where a model is referred to; it determines how the name is resolved.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Place {
     /// On the command line: a path from the working directory, or an embedded name.
@@ -114,7 +114,7 @@ pub struct Text {
     pub text: String,
     /// File name for messages.
     pub file: String,
-    /// Place of the models that it names.
+    /// Place of the models that it refers to.
     pub place: Place,
 }
 
@@ -135,7 +135,7 @@ impl Text {
         Ok(document.fill(document.parse()?)?)
     }
 
-    /// The text with its name, for errors that name a line.
+    /// The text with its name, for errors with a line number.
     pub fn document(&self) -> Document<'_> {
         Document {
             file: Path::new(&self.file),
@@ -143,13 +143,13 @@ impl Text {
         }
     }
 
-    /// Inconsistent values: problem and remedy.
+    /// Error for inconsistent values: problem and remedy.
     pub fn inconsistent(&self, message: impl Into<String>) -> ModelError {
         inconsistent(&self.file, message)
     }
 }
 
-/// Inconsistent values in a named file: problem and remedy.
+/// Error for inconsistent values in a named file: problem and remedy.
 pub fn inconsistent(file: &str, message: impl Into<String>) -> ModelError {
     let error = FileError {
         file: file.into(),

@@ -43,7 +43,7 @@ impl ThermalVariation {
     }
 }
 
-/// Seconds in a minute: rates are stated per K/min.
+/// Seconds per minute, because rates are stated per K/min.
 const MINUTE: f64 = 60.0;
 
 /// `[gyro.temperature]` or `[accel.temperature]` in an instrument file: 1σ of each, zero if not stated.

@@ -37,8 +37,8 @@ impl State {
 /// identity, the inputs of process noise, and the computed state at the end.
 ///
 /// Errors: φ in `C_computed = (I − [φ×]) C_true` (rad), δV and δp computed − true (m/s, m), all
-/// East-North-Up; parameter errors δθ true − estimated, in the order of [`crate::imu::TriadVector`].
-/// With these signs (Eq. 13 at a standing site)
+/// East-North-Up; parameter errors δθ true − estimated, in the order of [`crate::imu::TriadVector`]. With these signs
+/// (Eq. 13 at a stationary site)
 ///
 /// `φ̇ = −ω_ie × φ − C_b_n B_g δθ_g`, `δV̇ = f_n × φ − 2ω_ie × δV + C_b_n B_a δθ_a`, `δṗ = δV`,
 /// `B = (K̂Ĉ)⁻¹ ∂(K C u + D)/∂θ`.

@@ -39,12 +39,12 @@ pub type InputMatrix = SMatrix<f64, STATES, INPUTS>;
 /// in North-East-Down):
 /// * `δλ̇ = δV_E sec L/(R_N+h) + δL V_E tan L sec L/(R_N+h) − δh V_E sec L/(R_N+h)²`; printed, the
 ///   first term lacks sec L and the second has a minus.
-/// * `R_M` and `R_N` are the radii of the meridian and of the prime vertical; printed, they are named
-///   equatorial and polar radius.
+/// * `R_M` and `R_N` are the radii of the meridian and of the prime vertical; printed, they are called equatorial and
+///   polar radius.
 /// * The brackets in `δV̇` and `φ̇` are errors of the sensed quantity, `û − u`, not `û`; and ε and ∇ at
 ///   the end of the lines are these same errors, not to be counted twice.
-/// * `V × (2δω_ie + δω_en)` belongs to `δV̇` as printed; gravity's change with height and latitude,
-///   which is not printed, is added: without it a free height has no instability.
+/// * `V × (2δω_ie + δω_en)` belongs to `δV̇` as printed; the change of gravity with height and latitude (not printed)
+///   is added; without it, a free height would have no instability.
 ///
 /// The linear model neglects that a vertical error of specific force changes the period of the Schuler
 /// oscillation, even if height is held: after a time t the phase error is `ω_s t ∇_U / 2g`, one degree
@@ -112,8 +112,8 @@ impl ErrorModel {
     /// constant (Van Loan, "Computing integrals involving the matrix exponential", IEEE Trans.
     /// Automatic Control 23, 1978).
     pub fn over(&self, duration: f64) -> Transition {
-        // All entries of the scaled matrix are about the Schuler frequency, so the exponential keeps
-        // its digits over hours.
+        // All entries of the scaled matrix are of the order of the Schuler frequency, so the exponential remains
+        // accurate over hours.
         let schuler = (STANDARD_GRAVITY / SEMI_MAJOR_AXIS).sqrt();
         let unit = SVector::<f64, { STATES + INPUTS }>::from_fn(|i, _| match i {
             VELOCITY..POSITION => schuler * SEMI_MAJOR_AXIS,
@@ -210,7 +210,7 @@ impl SensedErrors {
     }
 }
 
-/// The linear error model at one moment, height held: `ẋ = F x + G (∂ε/∂θ) θ`.
+/// The linear error model at one moment, with the height held: `ẋ = F x + G (∂ε/∂θ) θ`.
 #[derive(Debug, Clone)]
 pub struct Linearisation {
     dynamics: Rows<STATES, STATES>,
@@ -236,7 +236,7 @@ impl Linearisation {
 }
 
 impl Instant {
-    /// The linear error model here, height held.
+    /// The linear error model here, with the height held.
     pub fn linear_model(&self) -> ErrorModel {
         let held = Height::Held {
             height: self.truth.height,

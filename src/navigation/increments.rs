@@ -27,9 +27,9 @@ pub struct Motion {
 }
 
 impl Increments {
-    /// Coning and sculling over this sample and the one before, exact to third order in the period;
-    /// the rotation term includes `α×(α×Δv)/6`, without which specific force would be 2 ppm too small in a
-    /// steady turn at 20°/s and 100 Hz.
+    /// Coning and sculling over this sample and the previous one, exact to third order in the period; the rotation term
+    /// includes `α×(α×Δv)/6`, without which specific force would be 2 ppm too small in a steady turn at 20°/s and 100
+    /// Hz.
     ///
     /// Source: Savage 1998, "Strapdown inertial navigation integration algorithm design", part 1
     /// (coning `Δα_{m−1} × Δα_m / 12`) and part 2 (velocity rotation compensation and sculling).
@@ -96,7 +96,7 @@ impl Sums {
             coning: Vector3::zeros(),
             sculling: Matrix3::zeros(),
         };
-        // Of those before it half, of the one next to it a twelfth.
+        // Half of the sum before the sample, and a twelfth of the adjacent sample.
         let mut past = PerSensor::<Vector3<f64>>::default();
         let mut before = samples.start.checked_sub(1).map(deviation);
         for (number, k) in samples.enumerate() {
@@ -132,7 +132,7 @@ impl Sums {
 
     /// Rotation and velocity change for these integrals, with second-order terms from the sums.
     ///
-    /// Source: as for [`Increments::motion`], whose terms of neighbouring samples are in the sums.
+    /// Source: as for [`Increments::motion`]; the sums contain its terms with neighbouring samples.
     pub fn motion(&self, increments: &Increments, instrument: &PerSensor<Instrument>) -> Motion {
         let [gyro, accel] = [&instrument.gyro, &instrument.accel].map(|triad| &triad.correction);
         let (later_angle, later_velocity) = (gyro * self.later.gyro, accel * self.later.accel);

@@ -4,8 +4,7 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 use crate::imu::{PARAMETERS as PER_TRIAD, Triad};
 
-/// Entries of `C_b_n b_k`, with `b = [u; 1]` of a triad's input u: for each column of `C_b_n` one `b_k` after the
-/// other.
+/// Entries of `C_b_n b_k`, with `b = [u; 1]` of a triad's input u: for each column of `C_b_n`, the four `b_k` in order.
 pub const INPUTS: usize = 12;
 
 /// `(K̂Ĉ)⁻¹ ∂(K C u + D)/∂θ`, errors of the corrected input of a triad with respect to its parameter errors δθ = true −

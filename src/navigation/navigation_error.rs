@@ -9,7 +9,7 @@ use super::strapdown::Solution;
 use crate::attitude::to_pitch_roll_heading;
 use crate::earth::Curvature;
 
-/// Errors, computed − true, of one moment.
+/// Errors, computed − true, at one moment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NavigationError {
     /// Pitch, roll and heading in rad, within ±π; differences of the angles of
@@ -60,7 +60,7 @@ impl NavigationError {
     pub fn by_state(truth: &Solution) -> Option<ErrorMatrix> {
         let [pitch, _, heading] = to_pitch_roll_heading(&truth.attitude);
         let ((sin_p, cos_p), (sin_h, cos_h)) = (pitch.sin_cos(), heading.sin_cos());
-        // −φ is what a change of each angle turns the body by.
+        // A change of each angle rotates the body by −φ.
         let axes = Matrix3::from_columns(&[
             Vector3::new(cos_h, -sin_h, 0.0),
             Vector3::new(sin_h * cos_p, cos_h * cos_p, sin_p),

@@ -9,8 +9,8 @@
 //!
 //! where `a` is the contribution of gravity and the rotating frame to specific force. All terms are slow compared with
 //! the motion of the body and proportional to the instrument errors, so steps of seconds preserve more digits than
-//! navigating the samples of an instrument and subtracting the truth. E is stored as a quaternion, whose vector part
-//! keeps the digits of a small rotation.
+//! navigating the samples of an instrument and subtracting the truth. E is stored as a quaternion, because its vector
+//! part keeps the digits of a small rotation.
 
 use nalgebra::{Matrix3, SVector, UnitQuaternion, Vector3};
 

@@ -131,7 +131,7 @@ impl Passage {
         for term in &mut self.terms {
             let response = responses.get(term.sensor).column(term.parameter);
             let step = attitude * response * period;
-            // A rate that changes evenly from sample to sample tilts by a twelfth of the change less.
+            // If the rate changes linearly from sample to sample, the tilt is smaller by a twelfth of the change.
             let change = step - term.last.unwrap_or(step);
             term.tilt += force.cross(&(term.input + step * 0.5 - change / 12.0));
             term.input += step;
@@ -145,11 +145,11 @@ impl Passage {
         let mut part = std::mem::take(&mut self.part);
         let over = part.noise.span(&self.noise.earth_rate);
         over.carry(&mut self.navigation);
-        // What tilts from the gyros make of specific force, ∫[f_n×] (∫C_b_n b_k dt) dt, by parts.
+        // Effect of gyro tilts through specific force, ∫[f_n×] (∫C_b_n b_k dt) dt, integrated by parts.
         let tilt = part.gyro * skew(-over.force) - part.forced;
         drive(&mut self.inputs.gyro, &over, &part.gyro, Some(&tilt));
         drive(&mut self.inputs.accel, &over, &part.accel, None);
-        // Stated gravity that is too small pulls the computed velocity down too little.
+        // If the stated gravity is too small, the computed downward acceleration is too small.
         let up = RowVector3::new(0.0, 0.0, over.duration);
         drive(&mut self.gravity, &over, &up, None);
         for term in &mut self.terms {
@@ -187,7 +187,7 @@ impl Passage {
     }
 }
 
-/// Adds the columns of a matrix, one after the other times each of four weights.
+/// Adds the columns of a matrix, each multiplied by each of four weights.
 #[inline]
 fn add_outer(sum: &mut Rows<3, INPUTS>, matrix: &Matrix3<f64>, weights: &Vector4<f64>) {
     for row in 0..3 {
@@ -216,7 +216,7 @@ fn drive<const N: usize>(
         Some(tilt) => {
             add(ATTITUDE, input, -1.0);
             add(VELOCITY, tilt, -1.0);
-            // A tilt that grows with time moves velocity with t² and position with t³.
+            // A tilt that grows linearly with time changes velocity with t² and position with t³.
             add(POSITION, tilt, -over.duration / 3.0);
         }
         None => {

@@ -34,7 +34,7 @@ impl NoiseInputs {
     pub fn covariance(&self, noise: &PerSensor<ProcessNoise>) -> ErrorMatrix {
         let mut sum = ErrorMatrix::zeros();
         for (number, part) in self.parts.iter().enumerate() {
-            // No covariance before the first part.
+            // There is no covariance before the first part.
             if number > 0 {
                 let over = part.span(&self.earth_rate);
                 // Φ P Φᵀ of a symmetric P, first from one side, then from the other.
@@ -56,9 +56,9 @@ pub struct NoiseInput {
     pub duration: f64,
     /// ∫f_n dt, m/s.
     pub force: Vector3<f64>,
-    /// ∫|ω − ω_ie|² dt in rad²/s and ∫|f + g|² dt in m²/s³ if the block is part of a move, else zero.
+    /// ∫|ω − ω_ie|² dt in rad²/s and ∫|f + g|² dt in m²/s³ if the block is part of a move, otherwise zero.
     pub motion: PerSensor<f64>,
-    /// Length in s if the block is part of a move, else zero.
+    /// Length in s if the block is part of a move, otherwise zero.
     pub moving: f64,
     /// Covariance in `n` that interpolated samples, if any, add to the integral of each triad's input, rad² and
     /// (m/s)².

@@ -17,8 +17,8 @@ use crate::imu::{
 };
 use crate::recording::{ImuSamples, Near};
 
-/// Length of a part, s, within which the effect of earlier errors is treated as a whole; the sensitivity of navigation
-/// is accurate to second order in it.
+/// Length of a part, s. Within a part, the effect of earlier errors is treated as a whole; the sensitivity of
+/// navigation is accurate to second order in this length.
 const PART: f64 = 0.1;
 /// Number of iterations for the input with error terms. A time offset of one sample of 10 ms at 200 °/s rotates
 /// specific force by 0.03, and each iteration leaves this fraction of the previous error: 10⁻⁶ of the effect of the
@@ -38,7 +38,7 @@ pub struct Navigator<'a> {
     gravity: Vector3<f64>,
     earth_rate: Vector3<f64>,
     earth_turn: Matrix3<f64>,
-    /// At the reference temperature.
+    /// Triads at the reference temperature.
     triads: PerSensor<Triad>,
     instrument: PerSensor<Instrument>,
     thermal: Option<Thermal>,
@@ -108,7 +108,7 @@ impl<'a> Navigator<'a> {
         let middle = 0.5 * (self.imu.time(samples.start) + self.imu.time(samples.end));
         let (t, rate) = (temperature.at(middle), temperature.rate(middle));
         thermal.state = thermal_state(&thermal.model.range, &t, &rate);
-        // Where a sensitivity is singular nothing is finite, and a pass diverges.
+        // If a sensitivity is singular, the results are not finite and the pass diverges.
         let singular = Matrix3::repeat(f64::NAN);
         self.instrument = PerSensor::from_fn(|sensor| {
             let triad = self.triads().get(sensor).to_owned();
@@ -159,7 +159,7 @@ impl<'a> Navigator<'a> {
     /// Removes the contribution of error terms from increments over a time; the sensed motion is updated.
     fn without_terms(&self, of_triads: Increments, sensed: &mut Sensed, period: f64) -> Increments {
         let mut increments = of_triads;
-        // Triads see u + t(u), and u is what is looked for.
+        // Triads sense u + t(u), and u is sought.
         for _ in 0..if self.shifted { ROUNDS } else { 0 } {
             let added = |sensor| sensed.added(sensor, &self.terms) * period;
             increments.angle = of_triads.angle - added(Sensor::Gyro);
@@ -201,7 +201,7 @@ impl<'a> Navigator<'a> {
             self.move_through(part.clone(), &mut passage);
             passage.end_part(self.bridged(&part));
         }
-        // Sensitivities to what changes by parts in a thousand are those in the middle.
+        // Sensitivities that change by only a few thousandths are evaluated in the middle.
         self.warm(&samples);
         self.block(passage)
     }
@@ -209,7 +209,7 @@ impl<'a> Navigator<'a> {
     /// Navigates through a few samples of a move.
     fn move_through(&mut self, samples: Range<usize>, passage: &mut Passage) {
         let period = self.imu.period;
-        // Coning needs the sample before, angular acceleration those on both sides.
+        // Coning needs the previous sample, angular acceleration the samples on both sides.
         self.near
             .reach(&(samples.start.saturating_sub(2)..samples.end + 1));
         let mut state = self.state;
@@ -270,8 +270,8 @@ impl<'a> Navigator<'a> {
         self.block(passage)
     }
 
-    /// As [`Self::standing`] for samples that include interpolated ones, given the block of equally many samples in the
-    /// same attitude.
+    /// Does the same as [`Self::standing`] for samples that include interpolated ones, given the block of the same
+    /// number of samples in the same attitude.
     pub fn standing_like(&self, block: &Block, samples: &Range<usize>) -> Block {
         let mut like = block.clone();
         for part in &mut like.noise.parts {
@@ -297,7 +297,7 @@ impl<'a> Navigator<'a> {
         period: f64,
     ) -> Vector3<f64> {
         let in_start_frame = state.attitude * motion.velocity;
-        // The frame turns with the Earth meanwhile.
+        // Meanwhile, the frame rotates with the Earth.
         let half_turn = self.earth_rate * (0.5 * period);
         let change = in_start_frame - half_turn.cross(&in_start_frame);
         let coriolis = self.earth_rate.cross(&state.velocity) * 2.0;

@@ -105,7 +105,7 @@ impl Instant {
     /// both in these axes.
     pub fn of(truth: Solution, turning: &Vector3<f64>, acceleration: &Vector3<f64>) -> Self {
         let rate = earth_rate_n(truth.latitude) + truth.transport_rate() + turning;
-        // What an unsupported body would do is not sensed.
+        // The acceleration of an unsupported body is not sensed.
         let force = acceleration - truth.acceleration(&Vector3::zeros());
         Self {
             truth,
@@ -132,7 +132,8 @@ pub enum Height {
 /// Navigation came too close to a pole.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 #[error(
-    "navigation reached latitude {:.3}°, and East-North-Up has no heading near a pole: stay within ±{:.1}°",
+    "navigation reached latitude {:.3}°, but the heading is undefined near a pole in East-North-Up: stay within \
+     ±{:.1}°",
     latitude / DEGREE,
     LARGEST_LATITUDE / DEGREE
 )]
@@ -143,11 +144,10 @@ pub struct NearPole {
 
 /// Navigates from increments.
 ///
-/// The motion of the body within a step follows from the increments with coning and sculling
-/// ([`Increments::motion`], third order in the step); the slow part — the turn of East-North-Up,
-/// Coriolis, gravity and position — is integrated with a Runge–Kutta step of fourth order, in which
-/// specific force changes linearly. An instrument at rest can therefore be navigated in steps of tens
-/// of seconds.
+/// The motion of the body within a step follows from the increments with coning and sculling ([`Increments::motion`],
+/// third order in the step); the slow part — rotation of East-North-Up, Coriolis, gravity and position — is integrated
+/// by a fourth-order Runge–Kutta step with linearly changing specific force. An instrument at rest can therefore be
+/// navigated in steps of tens of seconds.
 #[derive(Debug, Clone)]
 pub struct Strapdown {
     period: f64,
@@ -187,7 +187,7 @@ impl Strapdown {
         let mean = motion.velocity / period;
         let turning = increments.angle.cross(&increments.velocity);
         let change = (turning + increments.velocity - before.velocity) / period;
-        // What changes slowly since then: the turn of East-North-Up, velocity and position.
+        // Slow changes since the start: rotation of East-North-Up, velocity and position.
         let after = |part: f64, slow: &ErrorVector| {
             height.hold(start.with_errors(slow), &start, part, period)
         };
@@ -239,12 +239,11 @@ impl Solution {
         self.slow(&Vector3::zeros(), &Vector3::zeros())
     }
 
-    /// The same with a specific force along body axes, after this rotation of East-North-Up since the start of the
-    /// step.
+    /// Rates with a specific force along body axes, after this rotation of East-North-Up since the start of the step.
     #[inline]
     fn slow(&self, turn: &Vector3<f64>, force: &Vector3<f64>) -> ErrorVector {
         let rate = earth_rate_n(self.latitude) + self.transport_rate();
-        // Bortz's equation to the order that the turn within a step needs.
+        // Bortz equation to the order required by the rotation within a step.
         let across = turn.cross(&rate);
         let turning = rate + across * 0.5 + turn.cross(&across) / 12.0;
         let acceleration = self.acceleration(&(self.attitude * force));
@@ -252,7 +251,7 @@ impl Solution {
     }
 }
 
-/// Whether East-North-Up has a heading at a latitude, rad.
+/// Whether the heading in East-North-Up is defined at a latitude, rad.
 pub fn within_reach(latitude: f64) -> Result<(), NearPole> {
     // Written so that not-a-number is refused as well.
     if latitude.abs() <= LARGEST_LATITUDE {

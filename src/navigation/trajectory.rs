@@ -1,8 +1,7 @@
 //! True motion of a moving body, and the input sensed by an ideal instrument on it.
 //!
-//! Speed, heading and height follow raised-cosine profiles in closed form, and with them velocity,
-//! attitude and their derivatives. Latitude and longitude, which have no closed form, are integrals of
-//! the velocity.
+//! Speed, heading and height follow raised-cosine profiles in closed form; so do velocity, attitude and their
+//! derivatives. Latitude and longitude have no closed form and are integrals of the velocity.
 
 mod leg;
 mod segment;

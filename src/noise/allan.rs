@@ -42,7 +42,7 @@ pub fn cluster_sizes(samples: usize) -> Vec<usize> {
 pub fn overlapping(increments: impl Iterator<Item = f64>, period: f64, sizes: &[usize]) -> Curve {
     let increments: Vec<f64> = increments.collect();
     let mean = increments.iter().sum::<f64>() / increments.len().max(1) as f64;
-    // An even rate changes no second difference, but gravity would cost digits.
+    // A constant rate does not affect second differences; it is removed because gravity would cost digits.
     let rises = increments.iter().scan(0.0, |sum, increment| {
         *sum += increment - mean;
         Some(*sum)

@@ -16,18 +16,18 @@ const FEWEST: usize = 256;
 /// A stretch of samples.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stretch {
-    /// Samples.
+    /// Samples of the stretch.
     pub samples: Range<usize>,
     /// Name, such as `the whole recording`.
     pub name: String,
-    /// Whether the instrument is at rest during it, according to its own output.
+    /// Whether the instrument is at rest during the stretch, according to its own output.
     pub stands: bool,
 }
 
 /// Errors in finding a stretch to analyse.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum StretchError {
-    /// The label is not among the segments.
+    /// No segment has the label.
     #[error("no segment is labelled `{label}`; {}", known(labels))]
     UnknownLabel {
         /// The requested label.
@@ -67,8 +67,7 @@ impl Stretch {
     /// The longest segment with this label; without a label, the longest standstill, or the longest segment
     /// of a recording that is not continuous.
     ///
-    /// # Errors
-    /// [`StretchError`] if there is none, or if it is too short.
+    /// # Errors [`StretchError`] if there is no such stretch, or if it is too short.
     pub fn find(run: &Run, label: Option<&str>) -> Result<Self, StretchError> {
         let segments = &run.recording.segments;
         let stretch = match label {
@@ -158,7 +157,7 @@ pub struct NoiseAnalysis {
     pub pulse: PerSensor<f64>,
     /// Noise of both triads.
     pub triads: PerSensor<TriadNoise>,
-    /// Noise that the run states, if any.
+    /// Noise stated in the run, if any.
     pub stated: PerSensor<Option<Noise>>,
     /// The triads that were recorded.
     pub sensors: Vec<Sensor>,

@@ -20,7 +20,7 @@ pub struct RestNoise {
 }
 
 impl RestNoise {
-    /// The noise of samples in these dwells; `None` if no dwell is long enough.
+    /// The noise of the samples in these dwells; `None` if no dwell is long enough.
     pub fn of(imu: &ImuSamples, dwells: &[Range<usize>]) -> Option<Self> {
         let mut lengths: Vec<usize> = dwells.iter().map(ExactSizeIterator::len).collect();
         lengths.sort_unstable();

@@ -1,11 +1,10 @@
 //! The cluster times of a recording, and the covariance of Allan variances at them under a mixture of processes.
 //!
-//! An overlapping Allan variance is a mean of squared second differences `D`; for Gaussian noise
-//! `cov(⟨D₁²⟩, ⟨D₂²⟩) = 2 Σ cov(D₁, D₂)²` over all pairs of places. In terms of the squared strengths `c_p` this
-//! covariance is quadratic, so one table for each pair of processes serves every mixture. Source: Greenhall,
-//! Riley, *Uncertainty of Stability Variances Based on Finite Differences*, PTTI 2003, which does so for
-//! one process and one cluster time: their equivalent degrees of freedom (NIST SP 1065, 5.4.1) are
-//! `2 σ⁴ / var σ²`.
+//! An overlapping Allan variance is a mean of squared second differences `D`; for Gaussian noise `cov(⟨D₁²⟩, ⟨D₂²⟩) = 2
+//! Σ cov(D₁, D₂)²` over all pairs of positions. In terms of the squared strengths `c_p` this covariance is quadratic,
+//! so one table for each pair of processes serves every mixture. Source: Greenhall, Riley, *Uncertainty of Stability
+//! Variances Based on Finite Differences*, PTTI 2003 (for one process and one cluster time); their equivalent degrees
+//! of freedom (NIST SP 1065, 5.4.1) are `2 σ⁴ / var σ²`.
 
 use std::collections::BTreeMap;
 
@@ -30,7 +29,7 @@ const SHORTEST: f64 = 10.0;
 /// indistinguishable from white noise.
 const DISTINCT: f64 = 2.0;
 
-/// A record's cluster times, with tables for the covariance of its Allan variances.
+/// The cluster times of a recording, with tables for the covariance of its Allan variances.
 pub struct Clusters {
     period: f64,
     sizes: Vec<usize>,
@@ -40,7 +39,7 @@ pub struct Clusters {
 }
 
 impl Clusters {
-    /// Cluster times for a record of this many samples of `period` s.
+    /// Cluster times for a recording of this many samples of `period` s.
     pub fn new(samples: usize, period: f64) -> Self {
         let sizes = cluster_sizes(samples);
         let longest = sizes.last().copied().unwrap_or(0) as f64;
@@ -102,7 +101,7 @@ impl Clusters {
         (SHORTEST * self.period).max(DISTINCT * shortest)
     }
 
-    /// Gauss–Markov processes to try in such a fit.
+    /// Gauss–Markov processes to try in a fit that starts at this cluster time.
     pub fn markov(&self, shortest: f64) -> impl Iterator<Item = Process> {
         let is_distinct = move |time: f64| time >= self.shortest_time(shortest);
         let processes = self.processes.iter().copied();
@@ -117,7 +116,7 @@ struct Table {
     products: DMatrix<f64>,
 }
 
-/// `2 Σ R_p R_q` over all pairs of places, for clusters of `short` and `long` samples.
+/// `2 Σ R_p R_q` over all pairs of positions, for clusters of `short` and `long` samples.
 fn products(
     samples: usize,
     period: f64,
@@ -127,7 +126,7 @@ fn products(
     let (m, n) = (short as i64, long as i64);
     let places = |size: i64| (samples as i64 + 1 - 2 * size).max(0);
     let (first, second) = (places(m), places(n));
-    // Pairs of places this many samples apart.
+    // Number of pairs of positions that are this many samples apart.
     let common = |lag: i64| (first.min(second + lag) - lag.max(0)).max(0) as f64;
     // Lags at which a corner of one second difference meets a corner of the other.
     let corners: [(i64, f64); 9] = std::array::from_fn(|k| {
@@ -153,7 +152,7 @@ fn products(
         let values: Vec<f64> = processes.iter().map(|of| crossing(of, lag)).collect();
         for (p, value) in values.iter().enumerate() {
             for (q, other) in values[..=p].iter().enumerate() {
-                // Quantisation has its covariance at the corners alone, each of them a lag for itself.
+                // Quantisation has covariance only at the corners, each of which is a separate lag.
                 let steps = if processes[q] == Process::Quantisation {
                     1.0
                 } else {
@@ -163,7 +162,7 @@ fn products(
             }
         }
     }
-    // By itself a ramp does not vary.
+    // A ramp alone does not vary.
     for ramp in (0..processes.len()).filter(|&p| processes[p] == Process::RateRamp) {
         products[(ramp, ramp)] = 0.0;
     }

@@ -83,12 +83,11 @@ const fn row(
     }
 }
 
-/// √3600: from the root of a second to that of an hour.
+/// √3600: converts from the root of a second to that of an hour.
 const SQRT_H: f64 = 60.0;
-/// Floor of the Allan deviation of flicker noise over its coefficient, √(2 ln 2 / π).
+/// Floor of the Allan deviation of flicker noise, divided by its coefficient: √(2 ln 2 / π).
 const FLOOR: f64 = 0.664_282;
-/// 1σ of the Gauss–Markov process whose Allan deviation peaks (at 0.617 σ) at that floor, over the
-/// coefficient.
+/// 1σ of the Gauss–Markov process whose Allan deviation peaks (at 0.617 σ) at that floor, divided by the coefficient.
 const MARKOV: f64 = FLOOR / 0.617_362;
 
 /// Every unit of every quantity. An ambiguous unit has the first possible meaning.
@@ -197,7 +196,7 @@ pub enum ConversionError {
         known()
     )]
     Unknown {
-        /// As given.
+        /// The unit as given.
         unit: String,
     },
     /// A figure per sample without the sample rate.
@@ -205,7 +204,7 @@ pub enum ConversionError {
         "`{unit}` is noise per sample, which needs the sample rate: add --rate with the rate in Hz"
     )]
     NoRate {
-        /// As given.
+        /// The unit as given.
         unit: String,
     },
 }

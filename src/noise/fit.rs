@@ -13,7 +13,7 @@ pub fn allan_variance(mixture: &[(Process, f64)], tau: f64) -> f64 {
     parts.map(|(p, c)| c * p.allan_variance(tau)).sum()
 }
 
-/// Points with the covariance that gives their weights.
+/// Points with their covariance, which gives the weights.
 pub struct Weighted<'a> {
     tau: &'a [f64],
     variance: &'a [f64],
@@ -56,8 +56,8 @@ impl<'a> Weighted<'a> {
         Some(processes.zip(strengths.iter().copied()).collect())
     }
 
-    /// Covariance of the squared strengths of a fit and, in the last row, of the logarithm of the correlation time
-    /// if one of its processes has one.
+    /// Covariance of the squared strengths of a fit and, in the last row, of the log correlation time if one of its
+    /// processes has one.
     pub fn covariance(&self, mixture: &[(Process, f64)]) -> Option<DMatrix<f64>> {
         const STEP: f64 = 1e-4;
         let mut columns = self.columns(mixture.iter().map(|(process, _)| *process))?;

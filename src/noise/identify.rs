@@ -17,12 +17,12 @@ pub struct Found {
     pub strength: f64,
     /// 1σ of the strength.
     pub sigma: f64,
-    /// 1σ of the logarithm of the correlation time, if it has one.
+    /// 1σ of the log correlation time, if it has one.
     pub sigma_log_time: Option<f64>,
 }
 
 impl Found {
-    /// Own Allan variance at a cluster time.
+    /// Allan variance of this process alone at a cluster time.
     pub fn allan_variance(&self, tau: f64) -> f64 {
         self.strength.powi(2) * self.process.allan_variance(tau)
     }
@@ -52,11 +52,10 @@ pub struct Identified {
     /// Significant deviation of the curve from every mixture of processes, relative to the
     /// Allan variance (1σ); zero if there is none.
     pub misfit: f64,
-    /// Number of points at the start of the curve, the shortest cluster times, that the processes do not describe
-    /// because of the sensor's bandwidth or its pulses.
+    /// Number of points at the start of the curve (the shortest cluster times) that the processes do not describe
+    /// because of sensor bandwidth or pulses.
     pub first: usize,
-    /// Equivalent degrees of freedom of each point; for points that no process describes, from their
-    /// scatter.
+    /// Equivalent degrees of freedom of each point; for points that no process describes, those of their scatter.
     pub freedom: Vec<f64>,
     /// Processes for a filter that models white noise and one Gauss–Markov process: the processes found, with the
     /// nearest Gauss–Markov process in place of all other variations.
@@ -75,7 +74,7 @@ impl Identified {
         let (freedom, variance) = (*self.freedom.get(point)?, *curve.variance.get(point)?);
         let tail = 0.5 * (1.0 - probability);
         if freedom > MANY {
-            // Normal, and exact where nothing is random.
+            // The distribution is normal, and exact if nothing is random.
             let reach = Normal::standard().inverse_cdf(1.0 - tail) * (2.0 / freedom).sqrt();
             return Some((variance / (1.0 + reach), variance / (1.0 - reach)));
         }

@@ -2,8 +2,8 @@
 //! figures.
 //!
 //! Variances are two-sample (Allan) variances of the rate at a cluster time τ, in (rad/s)² or (m/s²)²,
-//! from the integrals of the output over each sample. Two-sided conventions: white noise of strength N
-//! has the two-sided power spectral density N², and its integral over t the variance `N² t`.
+//! from the integrals of the output over each sample. Two-sided conventions: white noise of strength N has the
+//! two-sided power spectral density N², and its integral over t has the variance `N² t`.
 
 mod allan;
 mod analysis;

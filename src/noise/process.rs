@@ -12,7 +12,7 @@ use crate::imu::Noise;
 /// 2003 (generalised autocovariances).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Process {
-    /// White noise of the integral, such as of pulses; slope −1, strength Q in rad or m/s.
+    /// White noise of the integral, as from pulses; slope −1, strength Q in rad or m/s.
     Quantisation,
     /// White noise of the rate; slope −1/2, strength N in rad/√s or (m/s)/√s.
     RandomWalk,
@@ -41,7 +41,7 @@ impl Noise {
 }
 
 impl Process {
-    /// The processes with a slope of their own, shortest cluster times first.
+    /// The processes with a distinct slope, shortest cluster times first.
     pub const SLOPES: [Self; 5] = [
         Self::Quantisation,
         Self::RandomWalk,
@@ -50,12 +50,12 @@ impl Process {
         Self::RateRamp,
     ];
 
-    /// Placeholder for a Gauss–Markov process of any correlation time.
+    /// Placeholder for a Gauss–Markov process with any correlation time.
     pub const MARKOV: Self = Self::GaussMarkov {
         correlation_time: 1.0,
     };
 
-    /// Whether both processes are of one kind, whatever their correlation times.
+    /// Whether both processes are of one kind, regardless of their correlation times.
     pub fn same_kind(self, other: Self) -> bool {
         std::mem::discriminant(&self) == std::mem::discriminant(&other)
     }
@@ -85,7 +85,7 @@ impl Process {
             Self::RateRandomWalk => tau / 3.0,
             Self::RateRamp => tau.powi(2) / 2.0,
             Self::GaussMarkov { correlation_time } => {
-                // From s(t) as below, for the closed form loses all digits where τ ≪ T.
+                // Computed from s(t) as below, because the closed form loses all digits if τ ≪ T.
                 let x = tau / correlation_time;
                 (4.0 * markov(x) - markov(2.0 * x)) / x.powi(2)
             }

@@ -5,8 +5,9 @@ use crate::recording::ImuSamples;
 
 /// Lengths of the compared sums, s. The first is used unless pulses dominate.
 const SUMS: [f64; 5] = [0.25, 0.5, 1.0, 2.0, 4.0];
-/// A third of normal deviates is below this, σ. If three quarters of a recording are at rest, the first quartile of all
-/// is the first third of these; if half or all of it is at rest, the estimate is 1.6 or 0.74 times the true noise.
+/// A third of normal deviates are below this, in σ. If three quarters of a recording are at rest, the first quartile of
+/// all sums is the first third of those at rest; if half or all of it is at rest, the estimate is 1.6 or 0.74 times the
+/// true noise.
 const FIRST_THIRD: f64 = 0.430_727;
 
 /// Random walk of a triad, rad/√s or (m/s)/√s, from the quieter part of a recording: from second differences of sums,
@@ -27,7 +28,7 @@ pub fn white_noise(imu: &ImuSamples, sensor: Sensor) -> f64 {
     found
 }
 
-/// The lower quartile of the second differences of sums over `length` samples; `None` for a record without any.
+/// The lower quartile of the second differences of sums over `length` samples; `None` for a recording without any.
 fn quieter_part(imu: &ImuSamples, sensor: Sensor, length: usize) -> Option<f64> {
     let mut differences = Vec::new();
     for stretch in &imu.stretches {

@@ -2,8 +2,8 @@
 //!
 //! Generalised least squares of the Allan variance itself, at cluster times half an octave apart, with the covariance
 //! of its points under the fitted mixture. The most likely combination of processes is selected. Each process must
-//! raise twice the logarithm of the likelihood by [`SIGNIFICANT`], and a correlation time by [`SIGNIFICANT_TIME`], so
-//! that a slope that is not observed gets no coefficient.
+//! raise twice the log-likelihood by [`SIGNIFICANT`], and a correlation time by [`SIGNIFICANT_TIME`], so that a slope
+//! that is not observed gets no coefficient.
 //!
 //! After El-Sheimy, Hou, Niu 2008 (the slopes) and Guerrier, Skaloud, Stebler, Victoria-Feser,
 //! *Wavelet-Variance-Based Estimation for Composite Stochastic Processes*, JASA 108 (2013) (least squares with the
@@ -25,16 +25,16 @@ const SIGNIFICANT: f64 = 9.0;
 const SIGNIFICANT_TIME: f64 = 4.0;
 /// A fit less probable than this does not describe the curve.
 const IMPROBABLE: f64 = 1e-3;
-/// If cluster times must be dropped, a start with a probability below this is accepted only if no later one is
-/// above it: a start too late costs little, a start too early is wrong.
+/// If cluster times must be dropped, a start with a probability below this is accepted only if no later start is above
+/// it: starting too late costs little, starting too early is wrong.
 const DOUBTFUL: f64 = 0.05;
 /// Cluster times dropped per step: an octave.
 const STEP: usize = 2;
 /// Range in which the deviation from all models is searched, relative to the Allan variance.
 const MISFITS: (f64, f64) = (1e-3, 10.0);
-/// Rounds of weights and fit.
+/// Number of rounds of weights and fit.
 const ROUNDS: usize = 5;
-/// Halvings of the step between correlation times tried.
+/// Number of halvings of the step between correlation times tried.
 const REFINEMENTS: usize = 10;
 /// 95 % quantile of the normal distribution.
 const BELOW_95: f64 = 1.645;
@@ -114,7 +114,7 @@ struct Candidate {
     mixture: Mixture,
     /// Whitened residuals of the cube roots, from the longest cluster time to the shortest.
     residual: DVector<f64>,
-    /// Minus twice the logarithm of the likelihood, without its constant.
+    /// Minus twice the log-likelihood, without its constant.
     unlikelihood: f64,
 }
 
@@ -137,7 +137,7 @@ impl Candidate {
         self.unlikelihood + SIGNIFICANT * self.mixture.len() as f64 + SIGNIFICANT_TIME * time
     }
 
-    /// Probability (p-value) of its residuals.
+    /// Probability (p-value) of the residuals of the mixture.
     fn probability(&self) -> f64 {
         let parameters = self.mixture.len() + usize::from(self.has_time());
         let freedom = self.residual.len().saturating_sub(parameters).max(1);
@@ -172,8 +172,8 @@ impl<'a> Search<'a> {
         &self.curve.variance[self.first..]
     }
 
-    /// The most likely mixture, if its residuals are probable, with their probability: the smaller one of all
-    /// residuals and of those at the short end.
+    /// The most likely mixture, if its residuals are probable, with their probability: the smaller of the probabilities
+    /// of all residuals and of those at the short end.
     fn probable(&self) -> Option<(Identified, f64)> {
         let best = self.most_likely()?;
         let probability = best.probability().min(best.probability_of_ends());
@@ -219,7 +219,7 @@ impl<'a> Search<'a> {
         let covariance = self.clusters.covariance(mixture);
         let logarithms: Vec<f64> = self.curve.variance.iter().map(|v| v.ln()).collect();
         let bends = logarithms.windows(3).map(|w| w[0] - 2.0 * w[1] + w[2]);
-        // Of three independent ones it has six times the variance of one.
+        // For three independent points, it has six times the variance of one point.
         let scatter: Vec<f64> = bends.map(|bend| bend * bend / 6.0).collect();
         let of_point = |(i, &tau): (usize, &f64)| {
             let square = allan_variance(mixture, tau).powi(2);
@@ -251,7 +251,7 @@ impl<'a> Search<'a> {
     /// The fit of a combination of processes, with weights from the fit itself; `None` if a strength is not positive.
     fn candidate(&self, processes: &[Process]) -> Option<Candidate> {
         let (tau, variance) = (self.tau(), self.variance());
-        // To begin with every point counts by its length alone.
+        // Initially, the weight of every point depends only on its length.
         let diagonal = variance.iter().zip(tau).map(|(v, tau)| v * v * tau);
         let diagonal = DVector::from_iterator(tau.len(), diagonal);
         let mut covariance = DMatrix::from_diagonal(&diagonal);
@@ -266,20 +266,20 @@ impl<'a> Search<'a> {
         self.judged(mixture, &covariance)
     }
 
-    /// Whether every process of a mixture contributes and is positive, except quantisation, which may be negative if it
-    /// models a bandwidth, and whether the sum is positive at every point.
+    /// Whether every process of a mixture contributes and is positive, and whether the sum is positive at every point.
+    /// Quantisation is excepted: it may be negative if it models a bandwidth.
     fn is_possible(&self, mixture: &[(Process, f64)]) -> bool {
         let (tau, variance) = (self.tau(), self.variance());
         let is_there = |&(process, strength): &(Process, f64)| {
             let is_part = |(&tau, v): (&f64, &f64)| {
                 (strength * process.allan_variance(tau) / v).abs() >= 1e-6
             };
-            // What a bandwidth takes away from the integral of white noise falls with the same slope.
+            // The reduction of the integral of white noise by a bandwidth has the same slope.
             tau.iter().zip(variance).any(is_part)
                 && (strength >= 0.0 || process == Process::Quantisation)
         };
-        // A Gauss–Markov process that is most of the shortest cluster time is no bias, but the output's own noise,
-        // whose bandwidth is less than that of the samples.
+        // A Gauss–Markov process that dominates at the shortest cluster time is not a bias, but the noise of the output
+        // itself, with a bandwidth below that of the samples.
         let varying = mixture.iter().filter(|of| of.0.same_kind(Process::MARKOV));
         let varying: Mixture = varying.copied().collect();
         let is_bandwidth = allan_variance(&varying, tau[0]) > 0.5 * allan_variance(mixture, tau[0]);
@@ -296,7 +296,7 @@ impl<'a> Search<'a> {
             .iter()
             .map(|&tau| allan_variance(&mixture, tau))
             .collect();
-        // The longest cluster times first, so that each adds what those longer than it do not show.
+        // The longest cluster times come first, so that each adds what longer cluster times do not show.
         let place = |i: usize| count - 1 - i;
         let residual = DVector::from_fn(count, |i, _| {
             let i = place(i);
@@ -321,12 +321,12 @@ impl<'a> Search<'a> {
 
     /// The combination with the best score.
     fn most_likely(&self) -> Option<Candidate> {
-        // Cluster times that are left out leave a tail behind, significant or not.
+        // Omitted cluster times leave a remainder, which may not be significant.
         let is_whole = |of: &Vec<Process>| self.first == 0 || of.contains(&Process::Quantisation);
         self.least(self.combinations().filter(is_whole), Candidate::score)
     }
 
-    /// Every combination of slopes; those without a floor also with each Gauss–Markov process, which comes last.
+    /// Every combination of slopes; combinations without a floor also with each Gauss–Markov process, in last position.
     fn combinations(&self) -> impl Iterator<Item = Vec<Process>> {
         let markov = self.clusters.markov(self.tau()[0]);
         let with_markov = markov.flat_map(|process| {
@@ -336,7 +336,7 @@ impl<'a> Search<'a> {
         subsets().chain(with_markov)
     }
 
-    /// The combination with the smallest figure among those that can be fitted.
+    /// The combination with the smallest score among those that can be fitted.
     fn least(
         &self,
         combinations: impl Iterator<Item = Vec<Process>>,
@@ -382,7 +382,7 @@ impl<'a> Search<'a> {
         };
         let is_hidden = |process: &Process| match process {
             Process::RateRamp => false,
-            // What varies with a correlation time has no floor besides.
+            // A variation with a correlation time has no additional floor.
             Process::BiasInstability if best.has_time() => false,
             _ => of_kind(found, *process).is_none(),
         };

@@ -9,9 +9,9 @@ use super::process::Process;
 use crate::imu::{GaussMarkov, Noise};
 use crate::statistics::{SIGMA_OF_MEDIAN, median};
 
-/// Neighbouring samples that differ by more than this many σ count as a knock.
+/// A difference of neighbouring samples by more than this many σ counts as a knock.
 const KNOCK: f64 = 8.0;
-/// Variation below this part of the mean is rounding.
+/// Variation below this fraction of the mean is rounding.
 const ROUNDING: f64 = 1e-9;
 /// Cluster time at which the Allan deviation of a Gauss–Markov process peaks, in correlation times.
 const PEAK: f64 = 1.89;
@@ -19,7 +19,7 @@ const PEAK: f64 = 1.89;
 /// The noise of a triad.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TriadNoise {
-    /// x, y, z.
+    /// Noise of the axes x, y, z.
     pub axes: [AxisNoise; 3],
     /// Noise from the mean Allan variance of all axes that vary. If the axes are alike, the mean resolves more than
     /// each axis alone. Processes found on all axes are kept within the range of the axes.
@@ -29,7 +29,7 @@ pub struct TriadNoise {
 /// The noise of one axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AxisNoise {
-    /// Its Allan variance.
+    /// Allan variance of the axis.
     pub curve: Curve,
     /// Processes identified; `None` if samples do not vary at all.
     pub identified: Option<Identified>,
@@ -139,7 +139,7 @@ impl AxisNoise {
 /// Number of neighbouring samples that differ by more than noise.
 fn knocks(values: &[f64]) -> usize {
     let mut steps: Vec<f64> = values.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
-    // Where most samples are equal the steps are those of quantisation.
+    // If most samples are equal, the steps are due to quantisation.
     let middle = median(&mut steps).filter(|middle| *middle > 0.0);
     let limit = middle.map_or(f64::INFINITY, |middle| KNOCK * SIGMA_OF_MEDIAN * middle);
     steps.iter().filter(|step| **step > limit).count()
@@ -190,7 +190,7 @@ fn root_mean_square(axes: &[&Found], process: Process) -> Found {
     let log_time = axes.iter().map(|of| time(of).ln()).sum::<f64>() / count;
     let of_times = axes.iter().map(|of| Some(of.sigma_log_time?.powi(2)));
     Found {
-        // From one second, which stands for any.
+        // Computed at one second, as an example of any cluster time.
         process: process.stretched(log_time.exp()),
         strength,
         sigma: squares.sum::<f64>().sqrt() / (count * strength),

@@ -21,22 +21,22 @@ pub struct LogFacts {
     pub off_stated_period: Option<f64>,
     /// The columns of each triad's body axes right, front, up, with values as in the file.
     pub columns: PerSensor<[ColumnFacts; 3]>,
-    /// The columns as `run.toml` names them.
+    /// The columns as given in `run.toml`.
     pub named: NamedColumns,
     /// The temperature column, if there is one.
     pub temperature: Option<TemperatureFacts>,
 }
 
-/// The columns as `run.toml` names them.
+/// The columns as given in `run.toml`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NamedColumns {
-    /// Column of time, if it is named.
+    /// Time column, if given.
     pub time: Option<String>,
     /// Columns of both triads, along the axes of the file.
     pub triads: PerSensor<[FileColumn; 3]>,
-    /// Column of temperature, if it is named.
+    /// Temperature column, if given.
     pub temperature: Option<String>,
-    /// From the file's axes to right-front-up.
+    /// Axis order from the axes of the file to right-front-up.
     pub axes: AxisOrder,
 }
 
@@ -99,7 +99,7 @@ pub struct ColumnFacts {
     pub largest: f64,
     /// Number of rows with the largest value.
     pub at_largest: usize,
-    /// The step of the grid on which all values lie, if they do.
+    /// The step of the grid on which all values lie, if there is one.
     pub step: Option<f64>,
     /// One unit of the column per row, rad or m/s by the nominal scale.
     #[serde(skip)]
@@ -179,7 +179,7 @@ impl ColumnFacts {
 /// Values are on a grid if no difference of consecutive values deviates by more than this part of a step from a
 /// multiple of the step.
 const OFF_GRID: f64 = 0.05;
-/// A range of more steps is that of a floating-point number, not of a register.
+/// A range with more steps than this belongs to a floating-point number, not to a register.
 const MOST_STEPS: f64 = 4_294_967_296.0;
 
 fn grid_step(values: &[f64]) -> Option<f64> {
@@ -197,7 +197,7 @@ fn grid_step(values: &[f64]) -> Option<f64> {
         if steps > MOST_STEPS || (difference / step - steps).abs() > OFF_GRID {
             return None;
         }
-        // Values are printed rounded; a long difference tells the step better.
+        // Printed values are rounded; a long difference gives the step more accurately.
         if steps > most {
             (step, most) = (difference / steps, steps);
         }

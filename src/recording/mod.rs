@@ -60,9 +60,7 @@ impl Recording {
     /// integrals of the normalised output (see [`crate::imu::Nominal`]) over each, rad and m/s along
     /// right-front-up.
     ///
-    /// # Errors
-    /// [`SampleError`] if the triads differ in length, or a number is not finite, or the period not
-    /// positive.
+    /// # Errors [`SampleError`] if the triads differ in length, a number is not finite, or the period is not positive.
     pub fn from_samples(
         name: &str,
         start: f64,
@@ -74,7 +72,7 @@ impl Recording {
         Ok(Self::of(name, imu))
     }
 
-    /// A recording of these samples alone.
+    /// A recording of only these samples.
     pub fn of(name: &str, imu: ImuSamples) -> Self {
         Self {
             name: name.to_owned(),
@@ -94,7 +92,7 @@ impl Recording {
 pub struct TableLog {
     /// Time of each reading, s.
     pub time: Vec<f64>,
-    /// Reading `C_b_n`, body to East-North-Up; as quaternions, since there may be a million of them.
+    /// Readings `C_b_n`, body to East-North-Up, as quaternions, because there may be a million of them.
     pub attitude: Vec<UnitQuaternion<f64>>,
     /// Angles of the axes at each reading; empty if the log does not give them.
     pub axes: Vec<AxisAngles>,

@@ -58,7 +58,7 @@ pub struct Stretch {
 /// Invalid arrays of samples.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum SampleError {
-    /// Triads of different length.
+    /// Triads with different numbers of samples.
     #[error("{gyro} gyro samples but {accel} accelerometer samples; give one of each per period")]
     Lengths {
         /// Samples of the gyros.
@@ -128,7 +128,7 @@ impl ImuSamples {
         Ok(Self::made(start, period, gyro, accel))
     }
 
-    /// Samples of rates with another period, of this relative 1σ.
+    /// Samples of rates with another period that has this relative 1σ.
     pub fn with_period(mut self, period: f64, sigma: f64) -> Self {
         let longer = period / self.period;
         for triad in [&mut self.gyro, &mut self.accel] {

@@ -14,11 +14,11 @@ pub struct Segment {
     pub start: f64,
     /// The first stamp after its last row, s.
     pub end: f64,
-    /// Samples, at least one.
+    /// The samples, at least one.
     pub samples: Range<usize>,
     /// `x_up` … `z_down`, `rot_x+360` and the like, or any other text.
     pub label: String,
-    /// The motion that the label states, if any.
+    /// The motion stated by the label, if any.
     pub motion: Option<LabelledMotion>,
 }
 
@@ -40,7 +40,7 @@ pub enum LabelledMotion {
 }
 
 impl LabelledMotion {
-    /// The motion that a label states, in axes of this order; `None` for any other text.
+    /// The motion stated by a label, in axes of this order; `None` for any other text.
     pub fn of_label(label: &str, axes: AxisOrder) -> Option<Self> {
         let axis = |name: &str| {
             let index = ["x", "y", "z"].into_iter().position(|axis| axis == name)?;

@@ -47,7 +47,7 @@ impl Series {
         self.part(k..k + 1).first().copied().unwrap_or_default()
     }
 
-    /// A range of increments; fewer at the end of the recording.
+    /// A range of increments; there are fewer at the end of the recording.
     pub fn part(&self, samples: Range<usize>) -> Cow<'_, [Vector3<f64>]> {
         let end = samples.end.min(self.len());
         let samples = samples.start.min(end)..end;

@@ -83,7 +83,7 @@ impl Temperature {
         })
     }
 
-    /// The lowest and the highest of a triad's axes, °C.
+    /// The lowest and the highest temperature of the axes of a triad, °C.
     pub fn range(&self, sensor: Sensor) -> [f64; 2] {
         self.extremes(sensor, |channel| &channel.values)
     }
@@ -130,7 +130,7 @@ fn parabola(values: &[f64], knot: usize) -> (f64, f64) {
         normal += row * row.transpose();
         right += row * (values[k] - values[knot]);
     }
-    // Two values have a line, one has itself.
+    // Two values define a line, one value a constant.
     let degree = over.len().min(3);
     for k in degree..3 {
         normal.fill_row(k, 0.0);

@@ -35,8 +35,8 @@ pub struct Position {
 pub struct MeanOutput {
     /// Normalised output per second, rad/s or m/s².
     pub output: Vector3<f64>,
-    /// Variance per axis from the instrument's noise, pulses and, if samples were interpolated, interpolation on the
-    /// axis with most of it.
+    /// Variance per axis from instrument noise, pulses and, if samples were interpolated, interpolation on the axis
+    /// with the most interpolated samples.
     pub variance: f64,
 }
 

@@ -1,4 +1,4 @@
-//! A run: one recording, and prior knowledge of the instrument, the site and the table.
+//! A run: one recording, with prior knowledge of the instrument, the site and the table.
 //!
 //! Everything is in SI, on right-front-up body axes and in normalised outputs (see [`crate::imu::Nominal`]);
 //! `turncal-files` converts the units and axes of files.
@@ -32,7 +32,7 @@ pub struct Run {
     pub instrument: Instrument,
     /// Site of the turntable.
     pub site: Site,
-    /// Accuracy of the table's readings; without effect if there are none.
+    /// Accuracy of the table readings; no effect if there are none.
     pub table: TableAccuracy,
     /// Motion of the IMU while the table is at rest.
     pub standstill: Standstill,
@@ -96,11 +96,10 @@ pub struct Standstill {
     /// White 1σ of the integral of each triad's output at standstill: attitude in rad, velocity in m/s;
     /// estimated from the dwells if not given.
     pub sigma: PerSensor<Option<f64>>,
-    /// Unwanted rotation of the body at rest if no table is observed: 1σ density of a random walk,
-    /// rad/√s.
+    /// Unwanted rotation of the body at rest, if no table is observed: 1σ density of a random walk, rad/√s.
     pub turning: f64,
-    /// 1σ of the IMU's position while the table is at rest, m. At least the distance of the IMU from the table centre,
-    /// because the IMU moves that far between positions.
+    /// 1σ of the IMU's position while the table is at rest, m. It must be at least the distance of the IMU from the
+    /// table centre, because the IMU moves that far between positions.
     pub position_sigma: f64,
 }
 

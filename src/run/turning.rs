@@ -13,7 +13,7 @@ use crate::units::DEGREE;
 pub const STEP: f64 = 0.1;
 /// Smallest angle that counts as a turn, rad.
 pub const SMALLEST: f64 = 1.0 * DEGREE;
-/// A turn disagrees if its angle differs by more than this part.
+/// A turn disagrees if its angle differs by more than this fraction.
 const OTHER_ANGLE: f64 = 0.1;
 /// A turn disagrees only if its angle also differs by more than this many σ of the gyros' scale factor.
 pub const SCALE_SIGMAS: f64 = 5.0;

@@ -31,7 +31,7 @@ pub struct SimulatedCampaign {
 const STREAMS: u64 = 1 << 10;
 
 impl SimulatedCampaign {
-    /// Whether the name is that of a campaign: a file that lists recordings, else an embedded campaign.
+    /// Whether the name is that of a campaign: a file that lists recordings, otherwise an embedded campaign.
     pub fn is_named(name_or_path: &str) -> bool {
         match models::text(Room::Campaign, name_or_path, &Place::CommandLine) {
             Ok(text) if text.place == Place::Embedded => true,
@@ -40,7 +40,7 @@ impl SimulatedCampaign {
         }
     }
 
-    /// Finds and reads a campaign, by embedded name or path, with the models that it names.
+    /// Finds and reads a campaign, by embedded name or path, with the models that it refers to.
     ///
     /// # Errors
     /// If one of them does not exist or is malformed.
@@ -48,7 +48,7 @@ impl SimulatedCampaign {
         let text = models::text(Room::Campaign, name_or_path, &Place::CommandLine)?;
         let file: CampaignFile = text.parse()?;
         let name = match &text.place {
-            // What an embedded one names is embedded, and by its path a scenario beside a file is meant.
+            // An embedded campaign refers to an embedded scenario; a campaign file refers to a scenario by its path.
             Place::File(path) => path.with_file_name(&file.scenario).display().to_string(),
             _ => file.scenario.clone(),
         };
@@ -115,7 +115,7 @@ impl SimulatedCampaign {
         Some(first.truth_over(simulated, &first.common))
     }
 
-    /// Common and individual properties of the recordings, as an engineer would state them.
+    /// Common and individual properties of the recordings, as a user would state them.
     pub fn together(&self) -> Together {
         let chambers = self.recordings.iter().map(|(_, own)| own);
         let warms = self.scenario.chamber.is_some() || chambers.flatten().next().is_some();

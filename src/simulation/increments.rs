@@ -14,7 +14,7 @@ pub struct Integrator {
     pub period: f64,
     /// Lever arm from the table's centre, where its axes meet, to the IMU, along body axes, m.
     pub lever_arm: Vector3<f64>,
-    /// Steps in a sample, each with two Gauss–Legendre points.
+    /// Number of steps in a sample, each with two Gauss–Legendre points.
     pub steps: u32,
 }
 

@@ -1,7 +1,7 @@
 //! Simulated runs with known truth: an instrument on a table that follows a path.
 //!
 //! Everything happens in memory. Truth, noise, the table's imperfections, its position errors and its readings draw
-//! from separate generators, so that changing one does not affect the others.
+//! from separate generators, so that a change of one does not affect the others.
 
 mod campaign;
 mod drive;
@@ -72,7 +72,7 @@ impl Simulated {
         }
     }
 
-    /// A truth of these triads, with their dependence on temperature over the range of some recordings.
+    /// A truth with these triads, and their dependence on temperature over the range of some recordings.
     fn truth_over(&self, recordings: &[Self], triads: &PerSensor<Triad>) -> Calibration {
         let Some(thermal) = &self.thermal else {
             return truth_record(triads, &self.run);

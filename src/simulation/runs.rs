@@ -1,4 +1,4 @@
-//! Many runs of a scenario, for which the table drives its path once.
+//! Many runs of a scenario; the motion of the table is computed once.
 
 use super::drive::Drive;
 use super::{Scenario, Simulated};

@@ -37,7 +37,7 @@ pub struct Scenario {
     /// The true body frame: in the accelerometer frame, the misalignment angles that it
     /// fixes are not drawn.
     pub body_frame: BodyFrame,
-    /// True values that are given instead of drawn.
+    /// True values that are stated instead of drawn.
     pub given: PerSensor<Given>,
     /// The table.
     pub table: Table,
@@ -60,8 +60,7 @@ pub struct Scenario {
     pub seed: u64,
 }
 
-/// True values of a triad that a scenario gives; the others are drawn. The prior stays that of the
-/// grade.
+/// True values of a triad stated in a scenario; the others are drawn. The prior remains that of the grade.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Given {
     /// Scale factors − 1.
@@ -73,7 +72,7 @@ pub struct Given {
 }
 
 impl Scenario {
-    /// Finds and reads a scenario, by embedded name or path, and the models that it names.
+    /// Finds and reads a scenario, by embedded name or path, and the models that it refers to.
     ///
     /// # Errors
     /// If one of them does not exist or is malformed, or they do not fit together.
@@ -224,9 +223,9 @@ impl Scenario {
         Ok(motion.dwells().map(|(start, end)| end - start).sum())
     }
 
-    /// Checks that would otherwise fail only in simulation.
+    /// Makes checks that would otherwise fail only during simulation.
     fn check(&self) -> Result<(), String> {
-        // With the errors of a real table, so that a path that cannot have them is found here.
+        // The check uses the errors of a real table, so that a path that does not support them is found here.
         let real = Imperfection::draw(&self.table, || 1.0);
         let motion = Motion::new(&self.table, &self.path, &real)
             .map_err(|error| format!("path {}: {error}", self.path_name))?;
@@ -258,7 +257,7 @@ impl Scenario {
     /// One triad's true parameters.
     pub(super) fn draw_truth(&self, sensor: Sensor, rng: &mut ChaCha8Rng) -> Triad {
         let variation = self.instrument.variation.get(sensor);
-        // All are drawn, given or not, so that giving one leaves the others as they were.
+        // All values are drawn, stated or not, so that stating one does not change the others.
         let scale = Vector3::from_fn(|_, _| variation.scale.draw(rng));
         let bias = Vector3::from_fn(|_, _| variation.bias.draw(rng));
         let angles = self.installation.draw(rng);
@@ -306,7 +305,7 @@ impl SiteFile {
             self.longitude_deg.0 * DEGREE,
             self.height_m.0,
         );
-        // What is simulated is known.
+        // The simulated properties are known.
         site.with_gravity(self.gravity_m_s2.map_or(site.gravity, |g| g.0), 0.0)
     }
 }
@@ -374,7 +373,7 @@ struct TruthFile {
     accel: GivenFile,
 }
 
-/// Biases are those of its triad's unit.
+/// The unit of the biases is that of the triad.
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct GivenFile {

@@ -18,7 +18,7 @@ pub struct Chamber {
     /// Time in s and temperature of the chamber in °C. Linear between points, constant before the first and after the
     /// last. The instrument starts soaked at the first.
     pub profile: Vec<(f64, f64)>,
-    /// Time constant of the instrument in the chamber, s; zero follows at once.
+    /// Time constant of the instrument in the chamber, s; with zero, it follows at once.
     pub time_constant: f64,
     /// White noise of one-second means of its temperature sensor, K.
     pub sensor_noise: f64,
@@ -60,7 +60,7 @@ impl Chamber {
         let mut at = self.at(0.0);
         let mut values = vec![at];
         for k in 1..=steps {
-            // A ramp within a step counts from its middle on.
+            // A ramp within a step is counted from the middle of the step on.
             let chamber = self.at((k as f64 - 0.5 * f64::from(keep > 0.0)) * STEP);
             at = chamber + (at - chamber) * keep;
             values.push(at);
@@ -85,7 +85,7 @@ impl Warming {
         (self.values[k] + rate * (at - k as f64) * STEP, rate)
     }
 
-    /// Sensor output.
+    /// Output of the temperature sensor.
     pub fn recorded(&self, duration: f64, noise: f64, rng: &mut ChaCha8Rng) -> Option<Temperature> {
         let spans = (duration / TEMPERATURE_SPACING).ceil() as usize;
         let middle = 0.5 * TEMPERATURE_SPACING;

@@ -59,7 +59,7 @@ pub struct Anees {
     pub mean: f64,
     /// n, the number of directions of one run that have a σ.
     pub directions: usize,
-    /// 95 % interval of the average if σ are correct (χ²).
+    /// 95 % interval of the average if the σ are correct (χ²).
     pub interval_95: (f64, f64),
     /// 99.8 % interval.
     pub interval_998: (f64, f64),

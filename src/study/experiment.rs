@@ -60,7 +60,7 @@ pub enum Situation {
 }
 
 impl Situation {
-    /// All, in the order of every result.
+    /// All situations, in the order in which results list them.
     pub const ALL: [Self; 3] = [Self::SelfAligned, Self::Aligned, Self::Moving];
 }
 
@@ -96,7 +96,7 @@ pub struct Worth {
     pub method: Method,
     /// Errors at the end, in the order of the instruments that have a calibration.
     pub errors: Vec<f64>,
-    /// At the end.
+    /// Distribution of the errors at the end.
     pub at_end: Spread,
     /// 99 % bootstrap interval of the median at the end.
     pub median_interval: (f64, f64),
@@ -104,7 +104,7 @@ pub struct Worth {
     pub largest: Spread,
     /// Errors at the end due to the errors of one triad alone.
     pub by_one: PerSensor<Spread>,
-    /// Final median of the closed form in the same misalignment form divided by that of this method; `None` for the
+    /// Final median of the closed form in the same misalignment form, divided by that of this method; `None` for the
     /// closed form.
     pub gain: Option<Ratio>,
     /// Budget of the final error from the stated covariance.
@@ -176,7 +176,7 @@ impl ExperimentStudy {
     }
 }
 
-/// The instrument used to compute missions; the effect of an error depends on the instrument by less than 1 %.
+/// The instrument used to compute missions; the effect of an error differs between instruments by less than 1 %.
 fn ideal() -> PerSensor<Triad> {
     PerSensor::from_fn(|_| Triad::ideal(InstallationForm::General))
 }

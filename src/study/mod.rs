@@ -42,10 +42,9 @@ pub trait Study: Sync {
     /// Number of runs.
     fn runs(&self) -> u64;
 
-    /// A function that makes the run with a given number.
+    /// A function that performs the run with a given number.
     ///
-    /// # Errors
-    /// [`StudyError`] if no run can be made.
+    /// # Errors [`StudyError`] if no run can be performed.
     fn maker(&self) -> Result<impl Fn(u64) -> Result<Self::Trial, StudyError> + Sync, StudyError>;
 
     /// The outcome of all runs, in the order of their numbers.
@@ -54,10 +53,9 @@ pub trait Study: Sync {
     /// [`StudyError`] if they cannot be evaluated.
     fn outcome(&self, trials: Vec<Self::Trial>) -> Result<Self::Outcome, StudyError>;
 
-    /// Makes some of the runs on all cores; `done` is called after each and may stop the study.
+    /// Performs some of the runs on all cores; `done` is called after each and may stop the study.
     ///
-    /// # Errors
-    /// [`StudyError`] if runs cannot be made, or if the study was stopped. A run without a calibration is not an error:
+    /// # Errors [`StudyError`] if runs cannot be performed, or if the study was stopped. A run without a calibration is not an error:
     /// it is counted.
     fn trials(&self, runs: &[u64], done: Done) -> Result<Vec<Self::Trial>, StudyError> {
         let make = self.maker()?;
@@ -71,7 +69,7 @@ pub trait Study: Sync {
         all.collect()
     }
 
-    /// The whole study.
+    /// Performs the whole study.
     ///
     /// # Errors
     /// As [`Self::trials`] and [`Self::outcome`].

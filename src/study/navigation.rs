@@ -1,5 +1,5 @@
 //! Navigation accuracy of a calibration: the nonlinear equations of navigation give the navigation error due to the
-//! errors of the calibration, and the linear model predicts σ of this error from the covariance.
+//! errors of the calibration, and the linear model predicts the σ of this error from the covariance.
 
 mod methods;
 mod outlook;
@@ -51,7 +51,8 @@ impl Motion {
         })
     }
 
-    /// Motion along a named trajectory, whose name is also returned, moved to another latitude in rad or height in m.
+    /// Motion along a trajectory with this name, moved to another latitude in rad or height in m; also returns the name
+    /// of the trajectory.
     ///
     /// # Errors
     /// [`ModelError`] if it cannot be read.
@@ -122,7 +123,7 @@ pub enum NavigationStudyError {
 }
 
 impl Pair {
-    /// A pair from records, converted to the general form and a common body frame, which is also returned. The truth
+    /// A pair from records, converted to the general form and a common body frame; also returns this frame. The truth
     /// may be a calibration with its own σ.
     ///
     /// # Errors
@@ -162,7 +163,7 @@ impl Pair {
             let correction = calibration
                 .correction()
                 .ok_or(NavigationStudyError::Singular { sensor })?;
-            // As u + (M − I) u, a small error keeps all its digits.
+            // Written as u + (M − I) u, so that a small error keeps all its digits.
             let difference = truth.sensitivity() - calibration.sensitivity();
             Ok::<_, NavigationStudyError>(Sensed {
                 relative: correction * difference,
@@ -233,7 +234,7 @@ impl Mission {
         self.errors_from(&ErrorVector::zeros(), pair)
     }
 
-    /// As [`Self::errors`], from a start with these errors.
+    /// Does the same as [`Self::errors`], from a start with these errors.
     ///
     /// # Errors
     /// As for [`Self::navigate`].
@@ -274,7 +275,7 @@ impl Mission {
         self.exposure_from(Sensitivity::zeros(), truth)
     }
 
-    /// As [`Self::exposure`], if the initial errors also depend on the parameters.
+    /// Does the same as [`Self::exposure`], if the initial errors also depend on the parameters.
     ///
     /// # Errors
     /// As for [`Self::navigate`].
@@ -287,7 +288,7 @@ impl Mission {
         let Motion::Standing(truth) = &self.motion else {
             return self.exposure_moving(sensitivity, &sensed);
         };
-        // At rest one exact step does for all intervals.
+        // At rest, one exact step serves for all intervals.
         let at = truth.steady();
         let transition = at.linear_model().over(self.interval);
         let added = transition.input * sensed.at(&at);
@@ -303,7 +304,7 @@ impl Mission {
         Ok(exposures)
     }
 
-    /// As [`Self::exposure`], step by step along a trajectory.
+    /// Does the same as [`Self::exposure`], step by step along a trajectory.
     fn exposure_moving(
         &self,
         mut sensitivity: Sensitivity,

@@ -24,10 +24,10 @@ pub struct PathStudy {
     pub options: Options,
 }
 
-/// Names of a path and of the models with which it is evaluated.
+/// Names of a path and of the models for its evaluation.
 #[derive(Debug, Clone, Default)]
 pub struct Named<'a> {
-    /// The path: a TOML file, an embedded name, or or a list of moves by hand.
+    /// The path: a TOML file, an embedded name, or a list of moves by hand.
     pub path: &'a str,
     /// The scenario; `None` for the usual one.
     pub scenario: Option<&'a str>,
@@ -54,13 +54,13 @@ pub struct Evaluation {
     pub bound: Bound,
     /// Error terms that are not estimated.
     pub left_off: Vec<TermLeftOff>,
-    /// The value of each move, in order; empty for a record.
+    /// The value of each move, in order; empty for a recording.
     pub without: Vec<Without>,
     /// Expected navigation errors.
     pub navigation: Vec<Outlook>,
 }
 
-/// Accuracy of a calibration without a move, in which attitude, velocity and position may change to anything.
+/// Accuracy of a calibration that lacks one move: attitude, velocity and position may change arbitrarily during it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Without {
     /// Time of the move and the dwell after it, s.
@@ -101,10 +101,9 @@ pub enum PathError {
 }
 
 impl PathStudy {
-    /// A path with the models that are named.
+    /// A path with the models given by name.
     ///
-    /// # Errors
-    /// [`PathError`] if one cannot be read, or the words are not turns.
+    /// # Errors [`PathError`] if a model cannot be read, or the words are not moves.
     pub fn load(named: &Named) -> Result<Self, PathError> {
         let by_hand = named.path.contains(',') || named.path.starts_with("turn ");
         let usual = if by_hand { "mems" } else { "demo" };
@@ -191,7 +190,7 @@ impl Evaluation {
         decided(specification, &self.bound.estimate)
     }
 
-    /// Expected results, without those of moves, and σ without each move.
+    /// Expected results (without the value of each move), and the σ without each move.
     fn new(
         problem: &Problem,
         (truth, terms): (&PerSensor<Triad>, &TermVector),

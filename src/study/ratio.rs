@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 const SAMPLES: usize = 2000;
 /// Probability outside the interval, half on each side.
 const OUTSIDE: f64 = 0.01;
-/// Seed of the bootstrap, whose draws are independent of those of the runs.
+/// Random seed of the bootstrap; its draws are independent of those of the runs.
 const SEED: u64 = 0;
 
 /// A ratio of root mean squares, or of medians.
@@ -41,8 +41,7 @@ impl Ratio {
     }
 }
 
-/// A statistic of all runs, which are given by their numbers, with its 99 % interval; `None` without
-/// runs.
+/// A statistic of all runs with its 99 % interval; `statistic` receives the run numbers. `None` without runs.
 pub fn bootstrap(runs: usize, statistic: impl Fn(&[usize]) -> f64) -> Option<(f64, (f64, f64))> {
     if runs == 0 {
         return None;
@@ -63,15 +62,14 @@ pub fn bootstrap(runs: usize, statistic: impl Fn(&[usize]) -> f64) -> Option<(f6
     ))
 }
 
-/// The median of some of the values, which are given by their numbers.
+/// The median of the values at these indices.
 pub fn median(of: &[f64], chosen: &[usize]) -> f64 {
     let mut values: Vec<f64> = chosen.iter().map(|&k| of[k]).collect();
     values.sort_by(f64::total_cmp);
     quantile(&values, 0.5)
 }
 
-/// The value below which this share of sorted values lies, by linear interpolation; NaN without
-/// values.
+/// The value below which this fraction of the sorted values lies, by linear interpolation; NaN without values.
 pub fn quantile(sorted: &[f64], share: f64) -> f64 {
     let place = share * sorted.len().saturating_sub(1) as f64;
     let (below, part) = (place as usize, place.fract());

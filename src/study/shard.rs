@@ -23,7 +23,7 @@ pub struct ShardError;
 
 impl Shard {
     /// The numbers of the part's runs among `count` runs, from zero, in order. A part read from a file may be invalid:
-    /// its runs may repeat without end.
+    /// its runs may then repeat endlessly.
     pub fn runs(self, count: u64) -> impl Iterator<Item = u64> {
         let next = move |run: &u64| run.checked_add(self.of);
         std::iter::successors(self.index.checked_sub(1), next).take_while(move |run| *run < count)

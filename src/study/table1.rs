@@ -57,7 +57,7 @@ pub enum Table1Error {
     /// The embedded models of the paper's instrument cannot be read.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// East-North-Up has no heading near a pole.
+    /// The heading is undefined near a pole in East-North-Up.
     #[error(transparent)]
     Navigation(#[from] NavigationStudyError),
     /// Invalid length of a run, h.
@@ -66,7 +66,7 @@ pub enum Table1Error {
     /// Standard deviations need two samples.
     #[error("{0} samples; expected at least 2")]
     Samples(usize),
-    /// A sample's positions leave its calibration undetermined.
+    /// The positions of a sample leave its calibration undetermined.
     #[error(
         "sample {0} cannot be calibrated from six positions: its misalignment angles are too large"
     )]

@@ -1,4 +1,4 @@
-//! The next move of a hand-held sensor: the one of 26 attitudes and six turns that lowers σ most.
+//! The next move of a hand-held sensor: among 26 attitudes and six turns, the one that lowers the σ most.
 //!
 //! The information of a short recording of the move (dwell, turn, dwell) is added to the information of the recording
 //! so far.
@@ -27,7 +27,7 @@ use crate::units::DEGREE;
 const DWELL: f64 = 5.0;
 /// Mean rate of a turn by hand, rad/s.
 const RATE: f64 = 45.0 * DEGREE;
-/// Sample period of the short records, s: noise is stated by its density, and hands are slow.
+/// Sample period of the short recordings, s: noise is stated by its density, and hands are slow.
 const PERIOD: f64 = 0.05;
 
 /// A move of the instrument, to be followed by a dwell.
@@ -68,8 +68,8 @@ impl Move {
     }
 }
 
-/// An attitude: −1, 0 or 1 along each body axis give the direction that points up, that from the centre of a cube to a
-/// face, an edge or a corner.
+/// An attitude: −1, 0 or 1 along each body axis give the upward direction, which is the direction from the centre of a
+/// cube to a face, an edge or a corner.
 pub type Attitude = [i8; 3];
 
 /// The six faces, then twelve edges, then eight corners.
@@ -98,7 +98,8 @@ pub struct Advisor {
 }
 
 impl Advisor {
-    /// Move before any calibration is possible: the axis whose upward position is farthest from all dwells.
+    /// The move before any calibration is possible: turns the axis up whose upward position is farthest from all
+    /// dwells.
     pub fn first(&self, survey: &Survey) -> Move {
         let faces = attitudes().take(6).map(up_in);
         let apart = |up: &Vector3<f64>| {
@@ -109,8 +110,8 @@ impl Advisor {
         Move::Up(farthest.unwrap_or(Vector3::z()))
     }
 
-    /// The move that lowers σ most, from the attitude in which this direction along body axes points up: only σ beyond
-    /// those that a specification needs count; without a specification, all σ.
+    /// The move that lowers the σ most, from the attitude in which this direction along body axes points up. With a
+    /// specification, only σ that are too large for it count; without one, all σ.
     pub fn next(
         &mut self,
         run: &Run,
@@ -139,8 +140,8 @@ impl Advisor {
     }
 }
 
-/// Sum of the logarithms of σ: relative to the σ that a specification needs, where larger; without a specification,
-/// of all σ in units of their prior.
+/// Sum of the log σ. With a specification, relative to the required σ, for σ that are larger; without one, of all σ in
+/// units of their prior.
 fn missing(attained: &Attained, sigma: &[f64], specification: Option<&Specification>) -> f64 {
     let Attained {
         bound,

@@ -20,13 +20,13 @@ pub struct Attained {
 }
 
 impl Attained {
-    /// Whether a specification is given and every limit seems to be decided.
+    /// Whether a specification is given and every limit seems to be decidable.
     pub fn is_met(&self) -> bool {
         are_decided(&self.checks)
     }
 
-    /// Time until every limit can be decided, s, if the rest of the record adds information as the rows so far; `None`
-    /// without a specification, or if the rows so far do not show a parameter.
+    /// Time until every limit can be decided, s, if the rest of the recording adds information at the same rate as the
+    /// rows so far; `None` without a specification, or if the rows so far do not show a parameter.
     pub fn time_left(&self, specification: Option<&Specification>) -> Option<f64> {
         let specification = specification?;
         let duration = self.bound.history.last()?.time;
@@ -69,7 +69,8 @@ pub fn decided(specification: &Specification, estimate: &Estimate) -> Vec<Check>
     })
 }
 
-/// σ of a group's parameters that decides its tightest limit for a unit at its nominal values; `None` without a limit.
+/// Largest σ of the parameters of a group that decides its tightest limit, for a unit at its nominal values; `None`
+/// without a limit.
 pub fn needed(specification: &Specification, group: Group) -> Option<f64> {
     let of_group = |limit: &&Limit| Group::of(limit.parameter) == group;
     let limits = specification.limits.iter().filter(of_group);

@@ -21,7 +21,7 @@ const EPOCH: f64 = 1.0;
 /// State of a calibration in progress.
 #[derive(Debug, Clone)]
 pub struct Status {
-    /// Duration of the record, s.
+    /// Duration of the recording, s.
     pub duration: f64,
     /// Content of the rows: dwells, turns, contradictions.
     pub survey: Survey,
@@ -38,13 +38,13 @@ pub struct Status {
 /// A calibration of the rows so far. Only a calibration finds the actual noise, unmodelled errors and their σ.
 #[derive(Debug, Clone)]
 pub struct InterimCalibration {
-    /// Duration of the record at that time, s.
+    /// Duration of the recording at that time, s.
     pub duration: f64,
     /// Verdict.
     pub verdict: Verdict,
     /// Findings.
     pub findings: Vec<Finding>,
-    /// Whether a specification is given and its σ decide every limit.
+    /// Whether a specification is given and the σ are small enough to decide every limit.
     pub is_met: bool,
     /// σ relative to those of the bound.
     inflation: ParameterVector,
@@ -57,7 +57,7 @@ pub struct Evaluator {
     specification: Option<Specification>,
     advisor: Advisor,
     calibrated: Option<InterimCalibration>,
-    /// Duration of the record at the last attempt to calibrate it, s.
+    /// Duration of the recording at the last attempt to calibrate it, s.
     attempted: f64,
 }
 
@@ -86,7 +86,7 @@ impl Evaluator {
         self.outlook(run)
     }
 
-    /// State of the recording so far, without a calibration: σ are those of the last calibration, changed by the
+    /// State of the recording so far, without a calibration: the σ are those of the last calibration, changed by the
     /// expected effect of later rows.
     pub fn outlook(&mut self, run: &Run) -> Status {
         let imu = &run.recording.imu;
@@ -131,7 +131,7 @@ impl Evaluator {
         })
     }
 
-    /// Takes the result of the calibration that was due.
+    /// Accepts the result of the calibration that was due.
     pub fn take(&mut self, calibrated: Option<InterimCalibration>) {
         self.calibrated = calibrated;
     }
@@ -213,7 +213,7 @@ impl Due {
 }
 
 impl Status {
-    /// Whether a specification is given and the last calibration decides every limit.
+    /// Whether a specification is given and the σ of the last calibration decide every limit.
     pub fn is_met(&self) -> bool {
         self.calibrated.as_ref().is_some_and(|of| of.is_met)
     }

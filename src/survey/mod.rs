@@ -20,7 +20,7 @@ use crate::run::motion::{self, LabelCheck, Rest, Turn};
 use crate::run::{Aiding, Run};
 use crate::units::DEGREE;
 
-/// Always in the general form, because forms differ only in their constraints.
+/// Predictions are always in the general form, because forms differ only in their constraints.
 const FORM: InstallationForm = InstallationForm::General;
 
 /// Content of a recording.
@@ -176,7 +176,7 @@ pub fn bound_of_record(run: &Run, options: &Options) -> Result<Bound, Calibratio
     let problem = start.by_hand(&problem).unwrap_or(problem);
     let problem = problem.with(|model| {
         let of_moves = &mut model.motion_noise.accel;
-        // What a hand leaves of velocity is never stated; a table without a log is taken for one.
+        // The residual velocity of a hand is never stated; a table without a log is treated like a hand.
         if model.aiding == Aiding::Velocity && *of_moves == MotionNoise::default() {
             *of_moves = MotionNoise::BY_HAND;
         }

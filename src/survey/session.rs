@@ -41,7 +41,7 @@ impl Session {
         }
     }
 
-    /// Sets the limits that the calibration is to decide.
+    /// Sets the limits to be decided by the calibration.
     pub fn to_decide(self, specification: Specification) -> Self {
         Self {
             evaluator: Evaluator::new(Options::default(), Some(specification)),

@@ -69,7 +69,7 @@ impl Chain {
         chain
     }
 
-    /// A table whose axes turn from these angles along these profiles; without profiles it is at rest.
+    /// A table whose axes turn from these angles along these profiles; without profiles, the table is at rest.
     pub fn of_table(
         table: &Table,
         imperfection: &Imperfection,
@@ -149,7 +149,7 @@ impl Chain {
 }
 
 impl Joint {
-    /// Continues the chain through its harmonics.
+    /// Continues the chain through the harmonics of the joint.
     fn stray(&self, state: &mut Kinematics, angle: f64, turned: &Turned) {
         // Cosine and sine of the angle, then of twice the angle, with their derivatives.
         let [c, s, c2, s2] = phases(angle);

@@ -9,7 +9,7 @@ use crate::attitude::exp;
 
 /// Number of axes with modelled errors, including the outermost.
 const AXES: usize = 3;
-/// Directions across an axis.
+/// Number of directions across an axis.
 const ACROSS: usize = 2;
 /// Cosine and sine of an axis' angle, then of twice that angle.
 pub const PHASES: usize = 4;
@@ -28,7 +28,7 @@ pub enum AxisError {
     /// Non-orthogonality of an inner axis: constant tilts in two directions across it.
     Tilt,
     /// Tilt of an axis that depends on its angle, once and twice per turn: for each axis, cosine and sine of the angle
-    /// and of twice the angle, in two directions across.
+    /// and of twice the angle, in two directions across it.
     Wobble,
     /// Encoder error that depends on its angle, once and twice per turn: for each axis, cosine and sine of the angle
     /// and of twice the angle.
@@ -129,10 +129,9 @@ pub fn table_geometry_name(k: usize) -> Option<String> {
 
 /// Rotation of the attitude of a table with axes at these angles, per error of the axes.
 ///
-/// `C_b_n = C_base R(a₁, θ₁) [I + t₂×] R(a₂, θ₂) [I + t₃×] R(a₃, θ₃) …`: a tilt of an axis in the frame of
-/// the next one outwards rotates everything that the axis carries, in the navigation frame by `R(a₁, θ₁) t₂`
-/// and `R(a₁, θ₁) R(a₂, θ₂) t₃`. Wobble is a t across the axis that depends on its angle, an encoder error a t
-/// along it.
+/// `C_b_n = C_base R(a₁, θ₁) [I + t₂×] R(a₂, θ₂) [I + t₃×] R(a₃, θ₃) …`: a tilt of an axis in the frame of the next one
+/// outwards rotates everything that the axis carries; in the navigation frame, this rotation is `R(a₁, θ₁) t₂` and
+/// `R(a₁, θ₁) R(a₂, θ₂) t₃`. Wobble is a t across the axis that depends on its angle, an encoder error a t along it.
 pub fn axis_response(axes: &AxisAngles) -> AxisResponse {
     let mut response = AxisResponse::zeros();
     let mut carried = Matrix3::identity();
@@ -168,7 +167,7 @@ pub fn axis_angles(axes: impl IntoIterator<Item = (Vector3<f64>, f64)>) -> AxisA
     std::array::from_fn(|_| axes.next())
 }
 
-/// Two directions across another and each other.
+/// Two directions perpendicular to another direction and to each other.
 pub fn across(direction: &Vector3<f64>) -> [Vector3<f64>; 2] {
     let one = Vector3::ith(direction.iamin(), 1.0)
         .cross(direction)

@@ -93,7 +93,7 @@ impl Motion {
         self.stretch(time).chain.stands()
     }
 
-    /// Number of moves started before a time in s, which is the number of the current position.
+    /// Number of moves started before a time in s; this is also the number of the current position.
     pub fn position(&self, time: f64) -> usize {
         self.stretch(time).position
     }
@@ -128,8 +128,8 @@ impl Motion {
         self.moves.push((start, self.duration()));
     }
 
-    /// Adds a stretch that takes time. The first, at rest, is kept even if it takes none: there is always an
-    /// attitude.
+    /// Adds a stretch that takes time. The first stretch, at rest, is kept even if it takes no time, so that there is
+    /// always an attitude.
     fn push(&mut self, duration: f64, chain: Chain) {
         let last = self.stretches.last();
         let (start, position) = last.map_or((0.0, 0), |last| (last.end, last.position));
@@ -191,7 +191,7 @@ fn body_profile(
 
 fn within(axis: &Axis, step: usize, rate: f64, acceleration: f64) -> Result<(), TableError> {
     let above = |what, unit, found: f64, limit: f64| {
-        // A limit given in degrees must admit itself.
+        // A value equal to a limit given in degrees must be accepted.
         if found <= limit * (1.0 + 1e-12) {
             Ok(())
         } else {

@@ -24,7 +24,7 @@ pub enum Moves {
         /// The moves in order.
         steps: Vec<AxesStep>,
     },
-    /// Rotations about body axes, as multi-position sequences are published.
+    /// Rotations about body axes, as in published multi-position sequences.
     Body {
         /// `C_b_n` at the start.
         start: Matrix3<f64>,
@@ -38,7 +38,7 @@ pub enum Moves {
 pub struct AxesStep {
     /// Turn of each axis, outermost first, rad.
     pub angles: Vec<f64>,
-    /// Rate that the turns reach, rad/s.
+    /// Maximum rate of the turns, rad/s.
     pub rate: f64,
     /// Peak acceleration, rad/s².
     pub acceleration: f64,
@@ -82,7 +82,7 @@ impl Moves {
         }
     }
 
-    /// Whether there are none.
+    /// Whether there are no steps.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -96,7 +96,7 @@ impl BodyStep {
 }
 
 impl Rotation {
-    /// The rotation vector in body axes, rad, from the attitude `C_b_n` where it begins.
+    /// The rotation vector in body axes, rad, given the attitude `C_b_n` at its beginning.
     pub fn vector(&self, attitude: &Matrix3<f64>) -> Vector3<f64> {
         match *self {
             Self::By(vector) => vector,
@@ -104,7 +104,7 @@ impl Rotation {
                 let target = attitude.tr_mul(&along);
                 let normal = axis.cross(&target);
                 let angle = normal.norm().atan2(axis.dot(&target));
-                // Half a turn goes about any axis across; the one through the next body axis will do.
+                // Half a turn can be about any perpendicular axis; the one towards the next body axis will do.
                 let across = Vector3::new(axis.z, axis.x, axis.y);
                 let direction = normal
                     .try_normalize(1e-9)

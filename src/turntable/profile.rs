@@ -24,8 +24,8 @@ pub struct Profile {
 }
 
 impl Profile {
-    /// The turn by `angle` (rad, signed) that reaches `rate` (rad/s) and has `acceleration` (rad/s²)
-    /// as its peak. A turn too short for the rate keeps the acceleration and stays below the rate.
+    /// The turn by `angle` (rad, signed) that reaches `rate` (rad/s) and has `acceleration` (rad/s²) as its peak. A
+    /// turn that is too short for this rate keeps the acceleration and remains below the rate.
     pub fn limited(angle: f64, rate: f64, acceleration: f64) -> Self {
         // Both ramps together turn by rate · ramp = π rate² / (2 acceleration).
         let rate = rate.min((2.0 * acceleration * angle.abs() / PI).sqrt());

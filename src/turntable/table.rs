@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{AxisError, PHASES, TableGeometry};
 
-/// Which of [`super::phases`] is the sine of the angle.
+/// Index of the sine of the angle in [`super::phases`].
 const SINE: usize = 1;
 
 /// A rotation axis of a table.

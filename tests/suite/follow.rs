@@ -131,7 +131,7 @@ fn a_run_toml_describes_rows_and_names_the_file_that_keeps_them() {
     let (output, _) = follow("other.csv");
     let told = text(&output);
     assert!(
-        !output.status.success() && told.contains("run.toml: [imu] names rows.csv"),
+        !output.status.success() && told.contains("run.toml: [imu] gives the log rows.csv"),
         "{told}"
     );
 }
@@ -341,7 +341,7 @@ fn the_log_of_a_run_is_not_extended_by_its_own_rows() {
     let output = child.wait_with_output().unwrap();
     let told = text(&output);
     assert!(
-        !output.status.success() && told.contains("names imu.csv.gz"),
+        !output.status.success() && told.contains("found the existing file imu.csv.gz"),
         "{told}"
     );
     assert_eq!(fs::read(run.join("imu.csv.gz")).unwrap(), log);

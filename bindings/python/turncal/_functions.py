@@ -159,7 +159,7 @@ def simulate(scenario: str = "demo", seed: int | None = None, directory: PathLik
         Name of an embedded scenario or campaign, such as "demo", "mems" or "five-soaks", or a TOML file; an unknown
         name lists all scenarios.
     seed : int, optional
-        Seed of all random numbers. Default: that of the scenario.
+        Random seed. Default: that of the scenario.
     directory : path-like, optional
         Directory for run.toml, imu.csv.gz and the other files of a recording, which is created if needed.
 

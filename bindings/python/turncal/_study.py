@@ -35,7 +35,7 @@ def study(
     runs : int
         Number of runs.
     seed : int, optional
-        Seed of all random numbers. Default: that of the scenario.
+        Random seed. Default: that of the scenario.
     with_, unmodelled : str or sequence of str
         Error terms to simulate and to estimate ("auto": no further ones); to simulate only.
     client : dask.distributed.Client, optional

@@ -39,7 +39,7 @@ pub struct Demo {
     /// Directory to write
     #[arg(short, long, value_name = "DIR", default_value = "turncal-demo")]
     output: PathBuf,
-    /// Seed of all random numbers [default: the scenario's]
+    /// Random seed [default: the scenario's]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = seed)]
     seed: Option<u64>,
     #[command(flatten)]
@@ -50,7 +50,7 @@ impl Demo {
     pub fn run(&self) -> anyhow::Result<()> {
         let directory = self.overwrite.directory(&self.output, &[])?;
         let activity = Activity::new("simulating both runs");
-        // The same seed gives both runs the same instrument.
+        // With the same seed, both runs have the same instrument.
         let (turning, standing) = rayon::join(
             || simulated(&Scenario::load("demo")?, self.seed),
             || static_positions(self.seed),
@@ -61,7 +61,7 @@ impl Demo {
         let problem = Problem::new(&turning.run, &Options::default());
         let solution = solve(&problem, Method::Ekf, &activity)?;
         if !solution.converged() {
-            bail!("the demonstration did not converge; take another --seed");
+            bail!("the demonstration did not converge; choose another --seed");
         }
         let assessment = solution.assess(&problem)?;
         activity.next("navigating");
@@ -162,7 +162,7 @@ fn static_positions(seed: Option<u64>) -> anyhow::Result<Simulated> {
     simulated(&Scenario::load("demo-six-position")?, seed)
 }
 
-/// Closed form from the first part of each dwell, so that the total is this fraction of the run time.
+/// Closed form from the first part of each dwell, with a total time of this fraction of the run.
 fn cut(problem: &Problem, part: f64) -> anyhow::Result<ClosedForm> {
     let imu = &problem.run().recording.imu;
     let at_rest: f64 = problem.dwells().map(|dwell| dwell.duration(imu)).sum();
@@ -173,7 +173,7 @@ fn cut(problem: &Problem, part: f64) -> anyhow::Result<ClosedForm> {
     Ok(calibration::six_position_of(problem, &dwells)?)
 }
 
-/// Navigates 40 h by each estimate, stationary and in flight.
+/// Navigates for 40 h with each estimate, stationary and in flight.
 fn fly(run: &Run, estimates: &[&Estimate], truth: &PerSensor<Triad>) -> anyhow::Result<Vec<Flown>> {
     let (flight, _) = models::trajectory("flight", &Place::Embedded)?;
     let still = Mission::standing_level(&run.site, FORTY_HOURS);

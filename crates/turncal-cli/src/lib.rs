@@ -93,8 +93,8 @@ enum Command {
     Man(man::Manual),
 }
 
-/// Runs a command line, whose first argument is the name of the command, and returns its exit status. Wrong usage exits
-/// at once.
+/// Runs a command line and returns its exit status. The first argument is the name of the command. Wrong usage exits at
+/// once.
 pub fn command(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let cli = Cli::parse_from(arguments);
     leave_nothing_behind();

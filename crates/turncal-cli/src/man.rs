@@ -60,7 +60,7 @@ fn page(command: &clap::Command) -> anyhow::Result<Vec<u8>> {
         .source(concat!("turncal ", env!("CARGO_PKG_VERSION")))
         .manual("turncal")
         .render(&mut text)?;
-    // What follows the options are examples first of all.
+    // The text after the options begins with the examples.
     Ok(String::from_utf8(text)?
         .replace(".SH EXTRA", ".SH EXAMPLES")
         .into_bytes())

@@ -5,7 +5,7 @@ use turncal_files::run_schema;
 
 /// Prints the JSON schema of run.toml, for completion and checks in editors
 ///
-/// Save it and name it in the first line of a run.toml: #:schema ./run.schema.json
+/// Save the schema and refer to it in the first line of a run.toml: #:schema ./run.schema.json
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:  turncal schema > run.schema.json")]
 pub struct Schema {}

@@ -24,7 +24,7 @@ pub struct Simulate {
     /// Directory to write
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
-    /// Seed of all random numbers [default: from the scenario]
+    /// Random seed [default: from the scenario]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = seed)]
     seed: Option<u64>,
     #[command(flatten)]

@@ -29,7 +29,7 @@ pub struct Opened {
 struct Log {
     path: PathBuf,
     draft: Draft,
-    /// Rows of standard input, until written next to a result.
+    /// Rows of standard input, until they are written next to a result.
     piped: Option<TempDir>,
 }
 
@@ -57,7 +57,7 @@ impl Opened {
         Ok(opened)
     }
 
-    /// As [`Self::new`] for files in memory: a `run.toml` or a log, which may name the others.
+    /// Does the same as [`Self::new`] for files in memory: a `run.toml` or a log, and the files it may refer to.
     ///
     /// # Errors
     /// As for [`Self::new`].
@@ -68,7 +68,7 @@ impl Opened {
         show: impl FnOnce(&Draft),
     ) -> Result<Self, FileError> {
         let Some(file) = files.first() else {
-            let advice = "Give a log, or a run.toml with the files that it names.";
+            let advice = "Give a log, or a run.toml with the files it refers to.";
             return Err(FileError::of(Path::new(""), "no file", "a log", advice));
         };
         Self::of_file(file, files, (stream, stated), show)
@@ -108,7 +108,7 @@ impl Opened {
         Ok(Self { run, log })
     }
 
-    /// Reads a log that has grown, with the fields found before.
+    /// Reads a log that has grown, with the fields found earlier.
     ///
     /// # Errors
     /// [`FileError`] if it cannot be read.
@@ -144,7 +144,7 @@ impl Opened {
     }
 }
 
-/// Whether a file is a `run.toml` or `campaign.toml`, which names others, and not a log: by its extension.
+/// Whether a file is, by its extension, a `run.toml` or `campaign.toml` (which refer to other files) and not a log.
 pub fn is_toml(path: &Path) -> bool {
     path.extension() == Some(OsStr::new("toml"))
 }

@@ -19,7 +19,7 @@ pub use directories::{
     input_digests, part_is_there, read_part_unit, record_inputs, unit_key, write_part, write_whole,
 };
 pub use door::{Opened, is_toml};
-// By these names the readers of rows know them.
+// Row readers use these names.
 use inputs::{course, joined, temperature};
 pub(crate) use quantity::unit_scale;
 use schema::instrument;

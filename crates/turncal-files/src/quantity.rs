@@ -14,7 +14,7 @@ pub const OUTPUTS: [Output; 3] = [Output::Pulse, Output::Increment, Output::Rate
 /// Quantity of a unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Of {
-    /// A triad's rows.
+    /// Rows of a triad.
     Rows(Sensor, Output),
     /// A count of any quantity.
     Count,

@@ -1,4 +1,4 @@
-//! Values checked while reading, so that errors name their line.
+//! Values checked while reading, so that errors give their line.
 
 use std::ops::RangeInclusive;
 
@@ -13,7 +13,7 @@ pub const GRAVITIES: RangeInclusive<f64> = 9.7..=9.9;
 /// Heights from the shore of the Dead Sea to above any laboratory, m.
 pub const HEIGHTS: RangeInclusive<f64> = -500.0..=9000.0;
 
-/// Squares and quotients of such numbers are finite.
+/// Squares and quotients of numbers within these limits are finite.
 fn with_size(value: f64) -> Result<f64, &'static str> {
     match value {
         _ if !value.is_finite() => Err("a finite number"),
@@ -22,7 +22,7 @@ fn with_size(value: f64) -> Result<f64, &'static str> {
     }
 }
 
-/// A number; as a text if it is none that a file can hold, which reading refuses.
+/// A number; as text if a file cannot contain it, so that reading refuses it.
 fn number<S: Serializer>(value: &f64, serializer: S) -> Result<S::Ok, S::Error> {
     if value.is_finite() {
         serializer.serialize_f64(*value)
@@ -54,20 +54,20 @@ checked!(
     /// Any number.
     #[derive(Default)]
     Finite, "a finite number", |_| true;
-    /// Above zero.
+    /// A number above zero.
     Positive, "a number above zero", |v| v > 0.0;
-    /// Zero or above.
+    /// A number of at least zero.
     #[derive(Default)]
     NonNegative, "a number of at least zero", |v| v >= 0.0;
     /// 1σ of an angle, ″, at most half a turn.
     Angle, "a number above zero and at most 648000", |v| v > 0.0 && v <= 648_000.0;
-    /// °
+    /// Latitude, °.
     Latitude, "a latitude from -90 to 90", |v| v.abs() <= 90.0;
-    /// °
+    /// Longitude, °.
     Longitude, "a longitude from -180 to 360", |v| (-180.0..=360.0).contains(&v);
-    /// m
+    /// Height above the ellipsoid, m.
     Height, "a height from -500 to 9000", |v| HEIGHTS.contains(&v);
-    /// m/s²
+    /// Gravity, m/s².
     Gravity, "a number from 9.7 to 9.9", |v| GRAVITIES.contains(&v);
     /// 1σ of gravity, mGal.
     Milligals, "a number from 0 to 100000", |v| (0.0..=1e5).contains(&v);
@@ -88,9 +88,9 @@ pub fn stated_gravity_sigma(written: &str) -> f64 {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(untagged, expecting = "three numbers, or one for all axes")]
 pub enum OneOrThree<T = Finite> {
-    /// For all axes.
+    /// One value for all axes.
     One(T),
-    /// For x, y and z.
+    /// Values for x, y and z.
     Three([T; 3]),
 }
 

@@ -1,4 +1,4 @@
-//! A TOML document whose errors name line, column, field, content found and remedy.
+//! A TOML document whose errors give line, column, field, content found and remedy.
 
 use std::fmt::Display;
 use std::ops::Range;
@@ -55,7 +55,7 @@ const KINDS: [(&str, &str); 4] = [
 /// The text that spans refer to.
 #[derive(Clone, Copy)]
 pub struct Document<'a> {
-    /// The file, as errors name it.
+    /// The file name in errors.
     pub file: &'a Path,
     /// Text.
     pub text: &'a str,

@@ -44,7 +44,7 @@ pub struct FileError {
 /// A place in a file; lines and columns count from one.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Place {
-    /// The file as a whole.
+    /// The whole file.
     File,
     /// A line.
     Line(u64),
@@ -73,11 +73,11 @@ pub enum Place {
     Byte(u64),
     /// A sample of a stream of such a file.
     Sample {
-        /// Number, from one.
+        /// Number of the sample, from one.
         number: u64,
         /// The stream.
         stream: String,
-        /// Where it is in the file.
+        /// Position of the sample in the file.
         byte: u64,
         /// The column at fault, if any.
         column: Option<String>,
@@ -174,7 +174,7 @@ impl FileError {
     }
 }
 
-/// Such as `1 row` or `3 rows`.
+/// A count with its noun, such as `1 row` or `3 rows`.
 pub fn counted(count: usize, name: &str) -> String {
     let plural = if count == 1 { "" } else { "s" };
     format!("{count} {name}{plural}")
@@ -192,14 +192,14 @@ pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
 
 /// Similarity of two names, from 0 to 1.
 fn likeness(name: &str, other: &str) -> f64 {
-    // This takes the product of both lengths, and those of names that are alike differ little.
+    // The time is proportional to the product of both lengths; similar names have similar lengths.
     if name.len() > LONGEST || other.len() > 4 * name.len() {
         return 0.0;
     }
     strsim::normalized_damerau_levenshtein(&name.to_lowercase(), &other.to_lowercase())
 }
 
-/// `Did you mean … ?`, or otherwise the given advice.
+/// `Did you mean … ?`, otherwise the given advice.
 pub fn suggestion<'a>(
     name: &str,
     candidates: impl IntoIterator<Item = &'a str>,

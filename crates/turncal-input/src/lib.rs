@@ -1,8 +1,8 @@
-//! What all readers share: errors that name file, line and field; TOML documents; checked numbers; units.
+//! Functions shared by all readers: errors with file, line and field; TOML documents; checked numbers; units.
 //!
-//! A reader finds something, expects something else and knows what to do: [`FileError`] says so in these words and with
-//! the place. [`Document`] gives these errors for TOML files, [`small_file`] reads a file as a whole with a limit on its
-//! size, and the checked numbers ([`Positive`], [`Latitude`] …) refuse a field that cannot be right.
+//! If a reader finds something other than it expects, a [`FileError`] gives what was found, what was expected, what to
+//! do, and where. [`Document`] gives these errors for TOML files, [`small_file`] reads a file as a whole with a limit
+//! on its size, and the checked numbers ([`Positive`], [`Latitude`] …) refuse a field that cannot be right.
 
 mod checked;
 mod document;

@@ -15,7 +15,7 @@ impl Sensor {
     /// Both triads, in the order of all files and state vectors.
     pub const ALL: [Self; 2] = [Self::Gyro, Self::Accel];
 
-    /// The name that files and parameter names use.
+    /// The name used in files and in parameter names.
     pub fn name(self) -> &'static str {
         match self {
             Self::Gyro => "gyro",
@@ -23,7 +23,7 @@ impl Sensor {
         }
     }
 
-    /// The first for the gyros, the second for the accelerometers.
+    /// The first value for the gyros, the second for the accelerometers.
     pub fn pick<T>(self, gyro: T, accel: T) -> T {
         match self {
             Self::Gyro => gyro,

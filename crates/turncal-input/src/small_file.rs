@@ -1,4 +1,4 @@
-//! Descriptions and results, read as a whole.
+//! Small files (descriptions and results), read as a whole.
 
 use std::fs::File;
 use std::io::{self, ErrorKind, Read};
@@ -9,7 +9,7 @@ use serde::de::DeserializeOwned;
 
 use super::error::FileError;
 
-/// Length limit, because any file or an endless device may be named.
+/// Length limit, because the user may give any file or an endless device.
 const MOST_BYTES: u64 = 1 << 24;
 
 /// All bytes of a file of at most 16 MiB.
@@ -25,7 +25,7 @@ pub fn read(path: &Path) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// The text of such a file.
+/// The text of a file of at most 16 MiB.
 pub fn read_text(path: &Path) -> io::Result<String> {
     let not_text = |_| io::Error::new(ErrorKind::InvalidData, "it is not UTF-8 text");
     String::from_utf8(read(path)?).map_err(not_text)
@@ -37,13 +37,13 @@ pub fn bytes(path: &Path, what: &str, advice: &str) -> Result<Vec<u8>, FileError
     bytes.map_err(|error| FileError::io(path, &format!("read {what}"), &error, advice))
 }
 
-/// The text of such a file.
+/// The text of a small file that contains `what`.
 pub fn text(path: &Path, what: &str, advice: &str) -> Result<String, FileError> {
     let text = read_text(path);
     text.map_err(|error| FileError::io(path, &format!("read {what}"), &error, advice))
 }
 
-/// Such a file of this JSON format.
+/// Reads a small JSON file and checks that its `format` is this one.
 pub fn json<T: DeserializeOwned>(
     path: &Path,
     what: &str,

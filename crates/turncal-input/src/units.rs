@@ -34,7 +34,7 @@ pub const MILLISECOND: f64 = 1e-3;
 /// One international nautical mile in metres (exact by definition).
 pub const NAUTICAL_MILE: f64 = 1852.0;
 
-/// A time rounded to 1 ns, so that it prints short.
+/// A time rounded to 1 ns, so that few digits are printed.
 pub fn nanoseconds(time: f64) -> f64 {
     (time * 1e9).round() / 1e9
 }

@@ -15,7 +15,7 @@ pub use wander::Wander;
 /// Meaning of the numbers in a time column.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum TimeUnit {
-    /// Number per second.
+    /// A unit of time, given as the number of units per second.
     PerSecond(f64),
     /// A counter of samples.
     Count,
@@ -35,11 +35,11 @@ impl TimeUnit {
 /// Allowed interruptions of row times.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Breaks {
-    /// None, because the rows are combined with another file.
+    /// No interruptions, because the rows are combined with another file.
     None,
     /// Pauses of any length.
     Pauses,
-    /// Restarts where the clock was set, because nothing else depends on the times.
+    /// Restarts where the clock was set; nothing else depends on the times.
     Settings,
 }
 
@@ -52,7 +52,7 @@ pub struct Clock<'a> {
     pub nanoseconds: Option<&'a str>,
     /// Unit of the column.
     pub unit: TimeUnit,
-    /// s
+    /// Sample period, s.
     pub period: Option<f64>,
     /// Interruptions that are not errors.
     pub breaks: Breaks,

@@ -28,7 +28,7 @@ const GZIP: [u8; 2] = [0x1f, 0x8b];
 
 /// A file of rows, positioned at one row.
 ///
-/// Fields are separated by commas, semicolons, tabs or blanks, whichever most rows use. Lines that begin with `#`, `%`
+/// Fields are separated by commas, semicolons, tabs or blanks, according to most rows. Lines that begin with `#`, `%`
 /// or `//` are comments; those above the names, or above rows of numbers without names, are a preamble. Columns without
 /// names are called `1`, `2`, …. Numbers may have a decimal comma if commas are not separators; a time may be a clock
 /// time.
@@ -36,9 +36,9 @@ pub struct CsvFile {
     file: PathBuf,
     lines: Lines,
     heading: Heading,
-    /// For rows of several kinds, the tag of the selected ones and its column.
+    /// Tag of the selected rows, and its column, for rows of several kinds.
     tag: Option<(usize, String)>,
-    /// For rows with words beside their numbers, their streams, the selected one and the sample that is read.
+    /// Streams, selected stream and current sample, for rows with words next to their numbers.
     labelled: Option<(Labelled, Stream, Sample)>,
     row: Row,
     /// Numbers in the used columns of the row.
@@ -48,14 +48,14 @@ pub struct CsvFile {
     cut: Option<Cut>,
 }
 
-/// Lines among the rows that are none.
+/// Lines among the rows that are not rows.
 #[derive(Debug, Default)]
 struct LeftOut {
-    /// Number of rows so far, and among the first lines.
+    /// Number of rows so far, and number of rows among the first lines.
     rows: usize,
     ahead: usize,
     count: usize,
-    /// Number and text of the first.
+    /// Number and text of the first such line.
     first: Option<(u64, String)>,
 }
 
@@ -66,7 +66,7 @@ impl LeftOut {
         self.first.get_or_insert_with(|| (line.number, text()));
     }
 
-    /// Whether so few lines are no rows that the rows are told from them.
+    /// Whether lines that are not rows are so few that the rows can be distinguished from them.
     fn are_rare(&self) -> bool {
         self.count * RARE <= self.rows.max(self.ahead)
     }
@@ -75,7 +75,7 @@ impl LeftOut {
 /// Uncertainty at the end of a file without a line ending.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Cut {
-    /// Last row lacks fields.
+    /// The last row lacks fields.
     Row,
     /// The last number of its last row may lack digits.
     Number,
@@ -189,11 +189,11 @@ impl CsvFile {
     }
 }
 
-/// The error for a text that is of another kind by its first line.
+/// The error for a text whose first line shows another kind of file.
 fn not_rows(file: &DataFile, lines: &Lines, is_labelled: bool) -> Option<FileError> {
     let first = lines.ahead().next()?.text.trim_ascii_start();
     let (found, advice) = match first.first()? {
-        // Rows may be objects, one in each line.
+        // Rows may be objects, one on each line.
         b'{' if first.len() == 1 || !is_labelled => (
             "JSON",
             "Give a log. To show a calibration, run turncal show FILE.",
@@ -228,7 +228,7 @@ impl Rows for CsvFile {
         &self.heading.remarks
     }
 
-    /// Also false at a truncated last row.
+    /// The result is also false at a truncated last row.
     fn advance(&mut self, used: &[usize]) -> Result<bool, FileError> {
         loop {
             let more = self.lines.advance(self.labelled.is_some());
@@ -297,7 +297,7 @@ impl Rows for CsvFile {
         String::from_utf8_lossy(self.bytes(column))
     }
 
-    /// Also true for placeholders of loggers.
+    /// The result is also true for placeholders of loggers.
     fn is_blank(&self, column: usize) -> bool {
         let bytes = self.bytes(column);
         bytes.is_empty() || bytes.eq_ignore_ascii_case(b"nan")

@@ -1,4 +1,4 @@
-//! A file of rows: on disk; its bytes in memory where there is no disk, as in a browser; or columns in memory.
+//! A file of rows: on disk, as bytes in memory (for example in a browser), or as columns in memory.
 
 use std::fs::{self, File};
 use std::io::{self, Cursor, Read, Seek};
@@ -9,7 +9,7 @@ use std::sync::Arc;
 use super::table::Table;
 use turncal_input::{FileError, nearest};
 
-/// A readable file, with the path by which `run.toml` and messages name it.
+/// A readable file, with its path as given in `run.toml` and messages.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DataFile {
     path: PathBuf,
@@ -52,7 +52,8 @@ impl DataFile {
         }
     }
 
-    /// The file of this path: one of those in memory, which have a name but no directory, otherwise on disk.
+    /// The file in memory with the name of this path, if there is one (files in memory have no directory); otherwise
+    /// the file on disk.
     pub fn find(path: PathBuf, in_memory: &[Self]) -> Self {
         let found = in_memory
             .iter()
@@ -60,12 +61,12 @@ impl DataFile {
         found.cloned().unwrap_or_else(|| path.into())
     }
 
-    /// Opens a regular file, which can be read more than once.
+    /// Opens a regular file, so that it can be read more than once.
     pub fn open(&self) -> Result<Box<dyn Content>, FileError> {
         if let Kind::Bytes(bytes) = &self.kind {
             return Ok(Box::new(Cursor::new(bytes.clone())));
         }
-        // To open a pipe would wait for whoever writes into it.
+        // Opening a pipe would wait for its writer.
         let kind = fs::metadata(self).map_err(|error| self.refused(&error))?;
         if !kind.is_file() {
             let found = if kind.is_dir() {

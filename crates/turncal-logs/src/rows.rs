@@ -9,7 +9,7 @@ use turncal_input::{FileColumn, FileError, Place};
 
 /// A file that provides rows of numbers in sequence.
 pub trait Rows {
-    /// The file, as errors name it.
+    /// The file name in errors.
     fn file(&self) -> &Path;
 
     /// The names of the columns.
@@ -32,7 +32,7 @@ pub trait Rows {
         [0.0; 3]
     }
 
-    /// Advances to the next row, of which these columns are used; false at the end.
+    /// Advances to the next row and uses these columns of it; false at the end.
     fn advance(&mut self, used: &[usize]) -> Result<bool, FileError>;
 
     /// The number in a column of the row; NaN if missing.
@@ -103,7 +103,7 @@ impl LogRows {
         }
     }
 
-    /// Index of a named column, which becomes exclusive.
+    /// Index of a named column; the column becomes exclusive.
     pub fn column(&mut self, name: &str) -> Result<usize, FileError> {
         let found = names::find(self.header(), &self.used, name);
         let place = found.map_err(|[found, expected, advice]| {
@@ -113,7 +113,7 @@ impl LogRows {
         Ok(place)
     }
 
-    /// Index of a column whose name may begin with a minus, which reverses the sign of the values.
+    /// Index of a column; a minus before its name reverses the sign of the values.
     pub fn signed_column(&mut self, name: &str) -> Result<(usize, FileColumn), FileError> {
         let literal = self.header().iter().any(|known| known == name);
         let bare = name.strip_prefix('-').filter(|_| !literal);

@@ -80,7 +80,7 @@ pub struct Table {
     pub columns: Vec<String>,
     /// Sections of rows.
     pub sections: Vec<Vec<Vec<String>>>,
-    /// Notes on reading it, a sentence each.
+    /// Notes on reading the table, a sentence each.
     pub notes: Vec<String>,
     /// Columns that a narrow terminal omits, the least important last.
     pub optional: Vec<usize>,

@@ -14,7 +14,7 @@ pub fn triad_name(sensor: Sensor) -> &'static str {
     }
 }
 
-/// Such as `3 turns` or `no findings`.
+/// A count with its noun, such as `3 turns` or `no findings`.
 pub fn several(count: usize, name: &str) -> String {
     match count {
         0 => format!("no {name}s"),

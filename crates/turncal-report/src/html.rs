@@ -92,7 +92,7 @@ pub fn page(document: &Document) -> String {
     page.into_string()
 }
 
-/// A text without parentheses and sentences about options of the command, which its reader may not have.
+/// A text without parentheses and sentences about command-line options, because the reader may not have the command.
 fn without_options(text: &str) -> String {
     let is_of_command = |part: &str| part.contains("--") || part.contains('`');
     let parts = text
@@ -196,9 +196,9 @@ fn unbroken(cell: &str) -> String {
     }
 }
 
-/// The figure in every width, of which the style shows one.
+/// The figure in every width; the style shows one of them.
 fn plot(of: &Plot) -> Markup {
-    // The namespace is needed in a file of its own only.
+    // The namespace is needed only in a separate file.
     let drawn =
         |width| svg::draw_at(of, width).replacen(r#" xmlns="http://www.w3.org/2000/svg""#, "", 1);
     html! {

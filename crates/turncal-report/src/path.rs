@@ -15,7 +15,7 @@ use turncal::study::navigation::MethodOutlook;
 use turncal::study::path::{Evaluation, PathStudy, Without};
 use turncal::turntable::{Moves, Rotation};
 
-/// A term is not observed if more than this part of its prior σ remains.
+/// A term is not observed if more than this fraction of its prior σ remains.
 const NOT_SHOWN: f64 = 0.5;
 /// Number of combinations of parameters in the data.
 const LISTED: usize = 5;
@@ -30,7 +30,7 @@ pub struct Report<'a> {
     pub moves: &'a [String],
     /// Expected results.
     pub evaluation: &'a Evaluation,
-    /// Limits of the specification that the calibration is to decide, if any.
+    /// Limits of the specification to be decided by the calibration, if any.
     pub checks: Option<&'a [Check]>,
 }
 
@@ -40,7 +40,7 @@ struct NotShown {
     what: String,
     /// Remaining part of the prior σ.
     remaining: f64,
-    /// Change of a group relative to its σ by an error term of usual size, the largest of all groups.
+    /// Change caused by an error term of usual size, relative to the σ of the group; the largest over all groups.
     change_in_sigma: Option<f64>,
     shown_by: String,
 }
@@ -59,8 +59,8 @@ impl Report<'_> {
             self.name
         ));
         document.lead = vec![format!(
-            "{}. The σ are Cramér–Rao bounds for a recording of this path with the stated noise; no data were \
-             measured.",
+            "{}. The σ are Cramér–Rao bounds for a recording of this path with the stated noise; they are not based on \
+             measured data.",
             self.with
         )];
         document.both(self.groups());
@@ -84,7 +84,7 @@ impl Report<'_> {
             (Some(checks), open, _) => (
                 Word::Undecided,
                 format!(
-                    "σ are too large to decide {open} of {} limits",
+                    "the σ are too large to decide {open} of {} limits",
                     checks.len()
                 ),
             ),
@@ -141,7 +141,7 @@ impl Report<'_> {
         facts
     }
 
-    /// σ of each group without what each move says, divided by σ with all moves.
+    /// σ of each group without the information from each move, divided by σ with all moves.
     fn moves(&self) -> Table {
         let (estimate, all) = (
             &self.evaluation.bound.estimate,
@@ -264,7 +264,7 @@ fn table(all: &[NotShown]) -> Table {
     .section(all.iter().map(row))
     .note(
         "Combinations of parameters, and error terms that are not estimated, that keep more than half of their prior \
-         σ. Could change: RMS over the group that a term of usual size changes most, in σ of the group.",
+         σ. Could change: RMS change, in σ, of the group most affected by a term of usual size.",
     )
 }
 
@@ -273,7 +273,7 @@ fn shown_by(direction: &Direction) -> String {
     let parts = direction.parts.iter();
     let largest = parts.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
     let name = largest.map_or("", |(name, _)| name.as_str());
-    // Of two axes, the second is the one that is turned about or points up.
+    // If there are two axes, the second is the axis of rotation or the upward axis.
     let axis = name.chars().last().unwrap_or_default();
     match (name.starts_with("gyro"), name.contains("bias")) {
         (true, true) => format!("longer dwells with {axis} in several directions"),

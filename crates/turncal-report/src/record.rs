@@ -1,4 +1,4 @@
-//! A calibration file, as it was written.
+//! Report on a calibration file, as it was written.
 
 use super::calibration::{cross_validation, in_order};
 use super::prelude::*;

@@ -65,7 +65,10 @@ pub fn screen(run: &Run, status: &Status, specification: Option<&Specification>)
     }
     lines.push(match status.next {
         Some(next) => format!("next: {}, then keep still for 5 s", words(next)),
-        None => "σ of the calibration decide every limit of the specification".to_owned(),
+        None => {
+            "the σ of the calibration are small enough to decide every limit of the specification"
+                .to_owned()
+        }
     });
     lines
 }
@@ -182,8 +185,8 @@ pub fn notes(run: &Run, status: &Status) -> Vec<String> {
     findings.iter().map(first).collect()
 }
 
-/// Upward directions seen from above the sensor: three layers of nine directions, those with z up, level, down; then the
-/// turns about both directions of each axis.
+/// Upward directions seen from above the sensor, in three layers of nine directions (z up, level, down); then the turns
+/// in both directions about each axis.
 fn coverage(status: &Status) -> Vec<String> {
     let mark = |done: bool| if done { '●' } else { '○' };
     let rests = status.survey.rests.iter();

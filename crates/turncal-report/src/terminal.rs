@@ -8,7 +8,7 @@ use turncal::calibration::Finding;
 
 /// Minimum width, in characters, of the lines of a broken column heading.
 const HEADING: usize = 9;
-/// Between two columns.
+/// Space between two columns.
 const GAP: usize = 2;
 
 /// Lines of one screen.
@@ -31,7 +31,7 @@ pub fn brief(document: &Document, width: Option<usize>) -> String {
     }
     let brief = document.brief.iter();
     let brief: Vec<_> = brief.map(|block| shown(block, Some(width))).collect();
-    // With a line between parts.
+    // Parts separated by an empty line.
     let taken: usize = brief.iter().chain([&head]).map(|part| part.len() + 1).sum();
     let findings = findings(&document.findings, width, SCREEN.saturating_sub(taken));
     laid([head, findings].into_iter().chain(brief).collect())
@@ -64,7 +64,7 @@ fn findings(all: &[Finding], width: usize, room: usize) -> Vec<String> {
         let is_last = place + 1 == all.len();
         let fits = lines.len() + more.len() + usize::from(!is_last) <= room;
         if place == 0 {
-            // At least what is wrong.
+            // At least the problem is shown.
             let room = room.saturating_sub(usize::from(!is_last)).max(LINES);
             more = at_most(room, more, width).collect();
         }
@@ -141,7 +141,7 @@ fn paragraphs(texts: &[&str], width: Option<usize>) -> Vec<String> {
     texts.flat_map(|text| wrapped(text, "", width)).collect()
 }
 
-/// Parts with a line between them.
+/// Parts separated by an empty line.
 fn laid(parts: Vec<Vec<String>>) -> String {
     let parts = parts.into_iter().filter(|part| !part.is_empty());
     let parts: Vec<String> = parts.map(|part| part.join("\n")).collect();
@@ -173,7 +173,7 @@ fn list(of: &List, mark: &str, width: Option<usize>) -> Vec<String> {
     headed(&of.heading, items)
 }
 
-/// Values below each other.
+/// Values aligned below each other.
 fn facts(of: &Facts, width: Option<usize>) -> Vec<String> {
     let names = of.rows.iter().map(|(name, _)| name.chars().count());
     let longest = names.max().unwrap_or(0);

@@ -128,7 +128,8 @@ pub fn explained(all: &[TermEvidence]) -> Table {
          probabilities.",
     )
     .note(
-        "σ grows: σ with the term divided by σ without it, RMS over the parameters of the group where it is largest.",
+        "σ grows: σ with the term divided by σ without it, RMS over the parameters of the group with the largest \
+         ratio.",
     )
     .note(
         "Shown by this path: whether the recording reduces the σ of every parameter of the term to less than half; if \

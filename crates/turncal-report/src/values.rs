@@ -4,10 +4,10 @@ use super::prelude::*;
 use turncal::calibration::{Calibration, FindingKind, Word};
 use turncal::imu::{AXES, Sensor};
 
-/// The unit of raw numbers, for which a scale factor relative to the nominal one says little.
+/// The unit of raw numbers; for these, a scale factor relative to the nominal one is of little use.
 const RAW: &str = "count";
 
-/// One row an axis.
+/// One row per axis.
 pub fn table(calibration: &Calibration) -> Table {
     let columns = ["", "K", "E to x, ″", "to y, ″", "to z, ″", "D"];
     let axes = Sensor::ALL
@@ -78,7 +78,7 @@ fn nominal(calibration: &Calibration, sensor: Sensor, axis: char) -> f64 {
         .provenance
         .as_ref()
         .map(|of| of.nominal.get(sensor)[place]);
-    // A record without its origin has no other nominal scale.
+    // A file without provenance has no other nominal scale.
     nominal.unwrap_or_else(|| calibration.triad(sensor).scale[place].abs())
 }
 
@@ -114,7 +114,7 @@ pub fn verdict(calibration: &Calibration) -> Option<(Word, String)> {
     Some((word, format!("{of_it}, {findings}")))
 }
 
-/// Number of parameters that a finding names as not observed.
+/// Number of parameters that a finding lists as not observed.
 fn unobserved(calibration: &Calibration) -> usize {
     let findings = calibration.findings.iter();
     let named = findings

@@ -1,9 +1,9 @@
 //! Contribution of the model's curvature to a covariance.
 //!
 //! A linear filter assumes that `K C` is linear in the parameters. If a path leaves some parameters at
-//! their prior σ, squares and products of their errors affect the parameters that it determines: two angles
-//! of 200″ shorten a row of the general form by 1 ppm, while a few turns give its scale factor to
-//! 0.3 ppm. For errors of arc seconds these terms are negligible.
+//! their prior σ, squares and products of their errors affect the parameters that it determines: two angles of 200″
+//! shorten a row of the general form by 1 ppm, while a few turns determine its scale factor to 0.3 ppm. For errors of
+//! arc seconds, these terms are negligible.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -14,8 +14,8 @@ use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad, TriadVector}
 const STEP: f64 = 1e-3;
 
 /// Mean squares of the second-order terms in the errors of the three parameters of each row, for errors with this
-/// covariance, to which they are added (Bar-Shalom, Li, Kirubarajan, *Estimation with Applications to Tracking and
-/// Navigation*, §10.3.2).
+/// covariance; they are added to the covariance (Bar-Shalom, Li, Kirubarajan, *Estimation with Applications to Tracking
+/// and Navigation*, §10.3.2).
 pub fn curvature(triads: &PerSensor<Triad>, covariance: &ParameterMatrix) -> ParameterMatrix {
     let mut added = ParameterMatrix::zeros();
     for sensor in Sensor::ALL {

@@ -1,10 +1,10 @@
 //! The uncertainty budget of an estimate: its covariance by source (JCGM 100:2008, JCGM 102:2011).
 //!
 //! The covariance of a filter is homogeneous of degree one in the variances of all sources together: priors, noise of
-//! the instrument, errors of the table, noise of each observation. So the part of a source is its variance times the
-//! derivative with respect to it, and the parts add up to the covariance (Euler). The parts of effects between dwells
-//! come from one backward pass (Koopman and Shephard 1992), that of the prior is exact, and those of sources at rest are
-//! differences of the chain.
+//! the instrument, errors of the table, noise of each observation. The part of a source is therefore its variance times
+//! the derivative of the covariance with respect to this variance, and the parts add up to the covariance (Euler). The
+//! parts of effects between dwells come from one backward pass (Koopman and Shephard 1992), the part of the prior is
+//! exact, and the parts of sources at rest are finite differences of the chain.
 
 pub mod curvature;
 
@@ -32,7 +32,7 @@ pub use source::BudgetSource;
 
 /// Two-sided coverage probability: k = 2 with a normal distribution.
 const COVERAGE: f64 = 0.954_499_736_103_642;
-/// The end of a 95 % interval, in σ.
+/// Half of a 95 % interval, in σ.
 const END_OF_INTERVAL: f64 = 1.959_963_984_540_054;
 /// Parts below this share of every variance are negligible.
 const NOTHING: f64 = 1e-12;
@@ -51,19 +51,19 @@ pub struct BudgetPart {
     pub source: BudgetSource,
     /// Part of the covariance of the parameters of both triads, in their units.
     pub covariance: ParameterMatrix,
-    /// Degrees of freedom with which its variance is known (JCGM 100, G.4.2); infinite if it is stated.
+    /// Degrees of freedom of its variance (JCGM 100, G.4.2); infinite if the variance is stated.
     pub degrees_of_freedom: f64,
 }
 
 impl BudgetPart {
-    /// Part of the variance of a parameter; a difference may be below zero by rounding.
+    /// Part of the variance of a parameter; rounding may make a difference slightly negative.
     fn variance(&self, parameter: usize) -> f64 {
         self.covariance[(parameter, parameter)].max(0.0)
     }
 }
 
-/// Relative change of the variance of a source at rest, for a difference: it is accurate to this, and the rounding of
-/// covariances that fall by ten orders of magnitude stays below that.
+/// Relative change of the variance of a source at rest, for a finite difference. The difference is accurate to this
+/// fraction; rounding errors stay below it even if covariances fall by ten orders of magnitude.
 const STEP: f64 = 3e-4;
 
 /// Sources that act within dwells. Each part is found by filtering the chain again with a slightly larger variance.
@@ -155,7 +155,8 @@ fn of_chain(
         known,
         posterior,
     } = &weighed;
-    // All but the candidates by what is known if these are, and the candidates by what they add.
+    // Parts of all sources except the candidates are computed as if the candidates were known; the parts of the
+    // candidates are what they add.
     let given = filtered.posterior_with(known, &Sites::certain(prior));
     let given = given.as_ref().unwrap_or(posterior);
     let constants = &posterior.constants;
@@ -173,7 +174,7 @@ fn of_chain(
     }
     let sum: ParameterMatrix = by_source.values().sum();
     let rest = posterior.parameter_covariance - sum;
-    // What differences leave over belongs to the largest.
+    // The remainder of the finite differences is assigned to the largest part.
     let trace = |part: &ParameterMatrix| relative(part, &posterior.parameter_covariance);
     let largest = by_source.iter_mut();
     let largest = largest.max_by(|a, b| trace(a.1).total_cmp(&trace(b.1)));
@@ -183,8 +184,8 @@ fn of_chain(
     Ok(by_source)
 }
 
-/// Parts of the sources at rest: their variance times the derivative of the covariance, `−C Λ′ C` with Λ′ that of the
-/// information of the rows.
+/// Parts of the sources at rest: their variance times the derivative of the covariance, `−C Λ′ C`, where Λ′ is the
+/// derivative of the information of the rows.
 fn at_rest(
     problem: &Problem,
     outcome: &Outcome,
@@ -204,8 +205,8 @@ fn at_rest(
     AT_REST.par_iter().map(part).collect()
 }
 
-/// Parts of the constants that may be absent: what all of them add is `A Σ⁻¹ Aᵀ`, Σ being their covariance and A that
-/// with all others; each has its column of `A Σ⁻½`, which are nearest to its own (Zuber and Strimmer 2011, "High-
+/// Parts of the constants that may be absent. Together they add `A Σ⁻¹ Aᵀ`: Σ is their covariance, A their covariance
+/// with all others. Each has one column of `A Σ⁻½`, the columns nearest to their own (Zuber and Strimmer 2011, "High-
 /// dimensional regression and variable selection using CAR scores", Statistical Applications in Genetics 10(1)).
 fn of_candidates(
     weighed: &Weighed,
@@ -238,7 +239,7 @@ fn of_candidates(
         .collect()
 }
 
-/// Sum of the variances over those of a whole.
+/// Sum of the variances, each divided by that of the whole.
 fn relative(part: &ParameterMatrix, whole: &ParameterMatrix) -> f64 {
     let pairs = part.diagonal().zip_map(&whole.diagonal(), |part, whole| {
         if whole > 0.0 { part / whole } else { 0.0 }
@@ -247,9 +248,9 @@ fn relative(part: &ParameterMatrix, whole: &ParameterMatrix) -> f64 {
 }
 
 impl BudgetSource {
-    /// Degrees of freedom with which its variance is known: ½ (u/Δu)² (JCGM 100, G.4.2). Δu is taken from the upper end
-    /// of the interval of the estimated noise, because the lower end may be zero; the smallest of several figures is
-    /// used, but at least one.
+    /// Degrees of freedom of its variance: ½ (u/Δu)² (JCGM 100, G.4.2). Δu is taken from the upper end of the interval
+    /// of the estimated noise, because the lower end may be zero; the smallest of several figures is used, but at least
+    /// one.
     fn degrees_of_freedom(self, outcome: &Outcome) -> f64 {
         let learnt = outcome.noise.sources.iter();
         let of_own = learnt.filter(|figures| figures.source.in_budget() == self);

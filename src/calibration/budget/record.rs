@@ -35,7 +35,7 @@ impl Budget {
         variance: impl Fn(usize) -> f64,
         factor: impl Fn(usize) -> f64,
     ) -> BudgetRecord {
-        // Differences below zero are left out, and without convergence the parts are those of another linearisation.
+        // Negative differences are left out; without convergence, the parts are from a different linearisation.
         let share = |i: usize| {
             let sum: f64 = self.parts.iter().map(|part| part.variance(i)).sum();
             if sum > 0.0 { variance(i) / sum } else { 0.0 }

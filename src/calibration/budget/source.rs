@@ -23,7 +23,7 @@ pub enum BudgetSource {
     RotationAtRest,
     /// Velocity at the first sample, and position in every dwell (distance of the IMU from the table centre).
     Place,
-    /// Position errors of the table, independent at each position.
+    /// Table position errors, independent at each position.
     TablePosition,
     /// Readings of the table.
     TableReading,
@@ -37,7 +37,7 @@ pub enum BudgetSource {
     TableNorth,
     /// Non-orthogonality of the table axes.
     TableSquareness,
-    /// Wobble of its axes.
+    /// Wobble of the table axes.
     TableWobble,
     /// Encoder errors that repeat with angle.
     TableEncoder,

@@ -16,9 +16,9 @@ use crate::calibration::Posterior;
 /// Moments of the disturbances of one event, given all data.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Moments {
-    /// Derivative of −2 ln L with respect to the logarithm of the variance of this event alone.
+    /// Derivative of −2 ln L with respect to the log variance of this event alone.
     pub slope: f64,
-    /// Expected curvature of −2 ln L with respect to the logarithm of its σ, from this event alone.
+    /// Expected curvature of −2 ln L with respect to the log σ, from this event alone.
     pub curvature: f64,
     /// Sum of the squared means of the disturbances, over their prior variance.
     pub squares: f64,
@@ -61,7 +61,8 @@ impl Cumulants {
 }
 
 impl Filtered<'_> {
-    /// Goes backward; `visit` gets the number of each link with the cumulants of its rows and all later rows.
+    /// Runs through the links backward; `visit` receives the number of each link with the cumulants of its rows and all
+    /// later rows.
     pub fn backward(&self, mut visit: impl FnMut(usize, &Cumulants)) {
         let (n, c) = (self.chain.states.count, self.chain.constants.len());
         let mut cumulants = Cumulants {
@@ -100,7 +101,7 @@ impl Filtered<'_> {
         Smoothed(events)
     }
 
-    /// Part of each effect in the covariance of the constants.
+    /// Contribution of each effect to the covariance of the constants.
     pub fn parts(&self, posterior: &Posterior) -> BTreeMap<Effect, DMatrix<f64>> {
         let c = self.chain.constants.len();
         let mut parts = BTreeMap::new();
@@ -140,7 +141,7 @@ impl SmoothedStates {
 }
 
 impl Filtered<'_> {
-    /// The states at the begin of the part of each requested link, given all data, in order.
+    /// The states at the beginning of the part of each requested link, given all data, in order.
     pub fn states<'a>(
         &'a self,
         posterior: &Posterior,
@@ -151,7 +152,7 @@ impl Filtered<'_> {
         })
     }
 
-    /// The means of these states alone.
+    /// Only the means of these states.
     pub fn means<'a>(
         &'a self,
         posterior: &Posterior,

@@ -20,7 +20,7 @@ pub struct Dynamics<'a> {
 }
 
 impl Dynamics<'_> {
-    /// Navigation errors at the end of a block per state at its begin, one column each.
+    /// Navigation errors at the end of a block per state at its beginning, one column each.
     pub fn by_states(&self, block: &Block) -> DMatrix<f64> {
         let mut by = DMatrix::zeros(NAVIGATION, self.states.count);
         by.columns_mut(0, NAVIGATION)
@@ -100,7 +100,7 @@ pub fn rates(block: &Block) -> SMatrix<f64, CONSTANTS, NAVIGATION> {
         rates[(axis, ATTITUDE + axis)] = 1.0 / t;
         rates[(3 + axis, VELOCITY + axis)] = 1.0 / t;
         for tilt in 0..3 {
-            // A rate tilts evenly while force acts on the tilt.
+            // A constant rate increases the tilt linearly, and specific force acts on this tilt.
             let of_tilt = block.navigation[(VELOCITY + axis, ATTITUDE + tilt)];
             rates[(3 + axis, ATTITUDE + tilt)] = -0.5 * of_tilt / t;
         }
@@ -108,7 +108,7 @@ pub fn rates(block: &Block) -> SMatrix<f64, CONSTANTS, NAVIGATION> {
     rates
 }
 
-/// Navigation errors at the end of a block at rest per rate and specific force.
+/// Navigation errors at the end of a block at rest, per rate and specific force.
 pub fn driven_at_rest(block: &Block) -> SMatrix<f64, NAVIGATION, CONSTANTS> {
     let t = block.duration;
     SMatrix::from_fn(|row, constant| {

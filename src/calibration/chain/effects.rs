@@ -8,17 +8,17 @@ use crate::calibration::{Group, Problem, Source};
 /// An effect that drives the states of the chain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Effect {
-    /// Noise whose size is estimated.
+    /// Noise of a source; its size is estimated.
     Noise(Source),
-    /// Differences between recordings, of a size that is estimated.
+    /// Differences between recordings; their size is estimated.
     Difference(Group),
-    /// A turn in a move that stays from then on.
+    /// A rotation in a move that remains afterwards.
     Slip(Slip),
     /// An effect of stated size.
     Stated(BudgetSource),
 }
 
-/// The part that slips in a move.
+/// The object that slips in a move.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Slip {
     /// The instrument on the table.
@@ -55,8 +55,8 @@ impl Effect {
     }
 }
 
-/// Variance of each effect relative to the variance with which the links were made, and of single events relative to
-/// their effect.
+/// Variance of each effect, relative to the variance with which the links were made, and of each single event, relative
+/// to its effect.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Sizes {
     effects: BTreeMap<Effect, f64>,
@@ -82,7 +82,7 @@ impl Sizes {
         of_effect * self.of_event(effect, event)
     }
 
-    /// The factor of an event over that of its effect.
+    /// The factor of an event divided by that of its effect.
     pub fn of_event(&self, effect: Effect, event: usize) -> f64 {
         self.events.get(&(effect, event)).copied().unwrap_or(1.0)
     }
@@ -114,7 +114,7 @@ impl Dispersion {
         Self(vec![1.0; problem.dwells().count()])
     }
 
-    /// Dispersion from these factors, divided by the factor of the median dwell, which is also returned.
+    /// Dispersion from these factors, divided by the factor of the median dwell; also returns this factor.
     pub fn of_dwells(mut factors: Vec<f64>) -> (Self, f64) {
         let middle = crate::statistics::median(&mut factors.clone()).unwrap_or(1.0);
         factors.iter_mut().for_each(|factor| *factor /= middle);

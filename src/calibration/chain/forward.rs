@@ -8,10 +8,10 @@ use super::states::States;
 use crate::calibration::constants::Sites;
 use crate::calibration::{CalibrationError, Constant, Known, Posterior, Prior, Problem, Script};
 
-/// Number of links whose rows are learnt at once.
+/// Number of links whose rows are added at once.
 const BLOCK: usize = 100;
 
-/// A link after the filter has passed it.
+/// A filtered link.
 #[derive(Debug, Clone)]
 pub struct Passed {
     /// States before the rows: mean given zero constants, effect of the constants, and covariance.
@@ -33,11 +33,11 @@ struct Forward {
     mean: DVector<f64>,
     by_constants: DMatrix<f64>,
     covariance: DMatrix<f64>,
-    /// Logarithm of the determinant of the covariance of all innovations.
+    /// Log-determinant of the covariance of all innovations.
     log_determinant: f64,
 }
 
-/// A chain after the filter has passed it.
+/// A filtered chain.
 pub struct Filtered<'a> {
     pub chain: &'a Chain,
     pub sizes: Sizes,
@@ -62,7 +62,7 @@ impl Chain {
         })
     }
 
-    /// Information on the constants from a filter with these sizes, whose links are not kept.
+    /// Information on the constants from a filter with these sizes, without keeping its links.
     ///
     /// # Errors
     /// [`CalibrationError::Diverged`] if a part cannot be reduced, or a covariance is not positive definite.
@@ -96,7 +96,7 @@ impl Forward {
         }
     }
 
-    /// Passes a link.
+    /// Filters one link.
     ///
     /// # Errors
     /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
@@ -121,7 +121,8 @@ impl Forward {
 }
 
 impl Passed {
-    /// Also the logarithm of the determinant of the innovations' covariance; `None` if that is not positive definite.
+    /// Also returns the log-determinant of the innovation covariance; `None` if this covariance is not positive
+    /// definite.
     fn new(
         link: &Link,
         mean: DVector<f64>,

@@ -1,4 +1,4 @@
-//! Innovations of single observations, and the estimate against time, as known to the filter while the table moves.
+//! Innovations of single observations, and the estimate against time, as a real-time filter would have it.
 
 use nalgebra::{DMatrix, DVector, Matrix3, SymmetricEigen};
 
@@ -13,18 +13,18 @@ use crate::calibration::{
     to_vector,
 };
 
-/// Most points of the estimate against time.
+/// Maximum number of points of the estimate against time.
 const EPOCHS: usize = 300;
 
-/// Mean of what a part is given, and a root of its covariance.
+/// Mean of the quantities given to a part, and a square root of their covariance.
 struct Expected {
     mean: DVector<f64>,
     root: DMatrix<f64>,
 }
 
 impl Filtered<'_> {
-    /// Innovations of all observations, each given those before it, and the estimate after parts of dwells. The sites
-    /// give the prior of the constants that may be absent.
+    /// Innovations of all observations, each given the preceding observations, and the estimate after parts of dwells.
+    /// The sites give the prior of the constants that may be absent.
     ///
     /// # Errors
     /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
@@ -91,9 +91,9 @@ impl Filtered<'_> {
 }
 
 impl Expected {
-    /// The innovation of an observation, with which the expectation is updated in Potter's form for three scalars at
-    /// once: `S − S Bᵀ L⁻ᵀ (L + 1)⁻¹ B` (Andrews 1968, "A square root formulation of the Kalman covariance equations",
-    /// AIAA Journal 6(6)). `factor`: of the σ of the dwell's noise.
+    /// The innovation of an observation; it updates the expectation in Potter's form for three scalars at once: `S − S
+    /// Bᵀ L⁻ᵀ (L + 1)⁻¹ B` (Andrews 1968, "A square root formulation of the Kalman covariance equations", AIAA Journal
+    /// 6(6)). `factor` multiplies the noise σ of the dwell.
     fn innovation(
         &mut self,
         of: &Whitened,
@@ -130,7 +130,7 @@ impl Expected {
     }
 }
 
-/// A root of a covariance that may be singular.
+/// A square root of a covariance that may be singular.
 fn root(covariance: DMatrix<f64>) -> DMatrix<f64> {
     let scale = covariance.diagonal().map(|value| value.max(0.0).sqrt());
     let inverse = scale.map(|of| if of > 0.0 { of.recip() } else { 0.0 });
@@ -141,7 +141,7 @@ fn root(covariance: DMatrix<f64>) -> DMatrix<f64> {
     DMatrix::from_diagonal(&scale) * eigen.eigenvectors * DMatrix::from_diagonal(&roots)
 }
 
-/// Rows that say what the sites of the constants that may be absent do; `None` if one is not positive definite.
+/// Rows equivalent to the sites of the constants that may be absent; `None` if one is not positive definite.
 fn rows_of(sites: &Sites, prior: &Prior) -> Option<DMatrix<f64>> {
     let (n, m) = (prior.sigma.len(), prior.candidates);
     let mut rows = DMatrix::zeros(m, n + 1);

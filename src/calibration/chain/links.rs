@@ -21,11 +21,11 @@ pub struct Chain {
     pub links: Vec<Link>,
     /// Number of scalars that were observed.
     pub observations: usize,
-    /// 1σ of the slip in one move over that of a position.
+    /// 1σ of the slip in one move, divided by that of a position.
     pub slip: f64,
     /// Sum of squares of the observations within parts that does not depend on states or constants.
     pub squares: f64,
-    /// Logarithm of the determinant of the covariance of the observations within parts.
+    /// Log-determinant of the covariance of the observations within parts.
     pub log_determinant: f64,
 }
 
@@ -56,7 +56,7 @@ impl Chain {
         Ok(Self { links, ..chain })
     }
 
-    /// A chain whose links are taken one by one.
+    /// A chain whose links are visited one by one.
     pub fn each(
         problem: &Problem,
         script: &Script,

@@ -1,10 +1,10 @@
 //! The chain of dwells: information from the parts of dwells, and the moves between them.
 //!
-//! Within a part of a dwell the noise at rest alone acts; [`links`] reduces each part once to rows of what it begins
-//! with and of the constants. Between parts the states go on through moves, table positions, and biases that vary: a
-//! chain of links, which [`forward`] filters with the constants as columns (Friedland 1969, "Treatment of bias in
-//! recursive filtering", IEEE Trans. Automatic Control 14(4)) and [`backward`] smooths. Another size of an effect
-//! touches no sample.
+//! Within a part of a dwell, only the noise at rest acts; [`links`] reduces each part once to rows in its initial
+//! states and the constants. Between parts, the states change through moves, table positions and varying biases: a
+//! chain of links, which [`forward`] filters with the constants as sensitivity columns (Friedland 1969, "Treatment of
+//! bias in recursive filtering", IEEE Trans. Automatic Control 14(4)) and [`backward`] smooths. Changing the size of an
+//! effect needs no new pass over the samples.
 
 mod backward;
 mod dynamics;

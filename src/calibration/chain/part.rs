@@ -1,13 +1,13 @@
-//! Reduction of a part of a dwell, with the noise at rest alone, to whitened rows of the states at its begin.
+//! Reduction of a part of a dwell, with only the noise at rest, to whitened rows of the states at its beginning.
 //!
 //! At rest the parameters act through three constant rates and three constant specific forces. Given these and the
-//! states at the begin (together `g`), only noise remains, which a filter of the moving states whitens in each
+//! states at the beginning (together `g`), only noise remains. A filter of the moving states whitens it in each
 //! observation. The whitened observations and the states at the end are linear in `g`: together they contain all
 //! information of the part (Friedland 1969, "Treatment of bias in recursive filtering", IEEE Trans. Automatic Control
 //! 14(4)).
 //!
-//! Beside the navigation errors an attitude is observed: by hand, the rotation since the body came to rest; after a move
-//! of a table, the attitude error less the settling of the table, which fades.
+//! In addition to the navigation errors, an attitude is observed: by hand, the rotation since the body came to rest;
+//! after a table move, the attitude error minus the fading settling of the table.
 
 mod course;
 
@@ -29,7 +29,7 @@ pub struct Part {
     pub values: DVector<f64>,
     /// Sum of squares of the observations that is independent of `g`.
     pub squares: f64,
-    /// Logarithm of the determinant of the covariance of the observations.
+    /// Log-determinant of the observation covariance.
     pub log_determinant: f64,
     /// Number of scalars that were observed.
     pub count: usize,
@@ -40,7 +40,7 @@ pub struct Part {
 }
 
 impl Part {
-    /// A copy with the variances of all its noise multiplied by a factor.
+    /// A copy with all noise variances multiplied by a factor.
     pub fn dispersed(mut self, factor: f64) -> Self {
         let root = factor.sqrt();
         self.measured /= root;
@@ -64,12 +64,12 @@ pub struct Whitened<'a> {
     pub rows: &'a [f64],
 }
 
-/// Reduces parts of dwells of one kind.
+/// Reduces parts of one kind of dwell.
 pub trait PartFilter {
     /// Size of `g`.
     fn given(&self) -> usize;
 
-    /// The reduction of a part; `None` if a covariance is not positive definite. `seen` gets each observation.
+    /// The reduction of a part; `None` if a covariance is not positive definite. `seen` receives each observation.
     fn reduce(
         &mut self,
         part: (&Rest, &Stretch),
@@ -78,7 +78,7 @@ pub trait PartFilter {
     ) -> Option<Part>;
 }
 
-/// The filters for this number of moving states: for parts that follow a move, and for others.
+/// The filters for this number of moving states: one for parts that follow a move, one for other parts.
 pub fn part_filters(moving: usize) -> [Box<dyn PartFilter>; 2] {
     let begins = begins(moving).into_iter().enumerate();
     if moving == NAVIGATION {
@@ -97,7 +97,7 @@ pub fn filter_of(rest: &Rest) -> usize {
     usize::from(!(rest.first && rest.new_position))
 }
 
-/// The moving states in `g`: in a dwell, nothing depends on position.
+/// The moving states in `g`; position is not among them, because nothing in a dwell depends on it.
 pub fn begins(moving: usize) -> Vec<usize> {
     let is_position = |state: &usize| (POSITION..POSITION + 3).contains(state);
     (0..moving).filter(|state| !is_position(state)).collect()
@@ -158,7 +158,7 @@ impl<const M: usize, const G: usize> PartFilter for Course<M, G> {
 }
 
 impl<const M: usize, const G: usize> Course<M, G> {
-    /// Begins with a part; returns the number of events so far.
+    /// Begins a part; returns the number of events so far.
     fn start(&mut self, rest: &Rest, model: &Model) -> usize {
         let settles = M == G;
         let models = rest.models.iter().map(|block| {
@@ -197,7 +197,7 @@ impl<const M: usize, const G: usize> Said<M, G> {
         }
     }
 
-    /// Refers the errors of attitude, velocity and position to others.
+    /// Converts the errors of attitude, velocity and position to another reference.
     fn refer(&mut self, by: [Vector3<f64>; 3]) {
         let errors = [ATTITUDE, VELOCITY, POSITION].into_iter().zip(by);
         let observed = (M > NAVIGATION).then_some((NAVIGATION, by[0]));
@@ -206,7 +206,7 @@ impl<const M: usize, const G: usize> Said<M, G> {
         }
     }
 
-    /// Adds an observation of the states from a first one on; returns it whitened.
+    /// Adds an observation of the states from the given one on; returns the whitened observation.
     fn observe(
         &mut self,
         gain: &Gain<M, G>,
@@ -229,7 +229,7 @@ fn matrix<const N: usize>(rows: &[[f64; N]]) -> DMatrix<f64> {
     DMatrix::from_row_slice(rows.len(), N, rows.as_flattened())
 }
 
-/// Propagation of the moving states in a step, in which the difference of the two attitudes fades by a factor.
+/// Propagation of the moving states in a step; the difference of the two attitudes fades by a factor.
 fn step_model<const M: usize, const G: usize>(
     block: &Block,
     model: &Model,

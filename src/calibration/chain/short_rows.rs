@@ -10,7 +10,7 @@ pub fn add<const N: usize>(sum: &mut [f64; N], weight: f64, row: &[f64; N]) {
     }
 }
 
-/// `L⁻¹` times rows.
+/// Multiplies rows by `L⁻¹`.
 pub fn whiten<const N: usize>(root: &Matrix3<f64>, rows: &mut [[f64; N]; 3]) {
     for k in 0..3 {
         let (before, from) = rows.split_at_mut(k);
@@ -22,9 +22,9 @@ pub fn whiten<const N: usize>(root: &Matrix3<f64>, rows: &mut [[f64; N]; 3]) {
     }
 }
 
-/// Rows r with `Σ rᵀ r` this matrix and, with a value v each, `Σ rᵀ v` this vector, each after the component
-/// that it eliminates: Cholesky factorisation with pivoting on the largest remaining diagonal element, until only
-/// rounding remains (Golub and Van Loan, *Matrix Computations*, 4th ed., §4.2.8).
+/// Rows r, each with a value v, such that `Σ rᵀ r` is this matrix and `Σ rᵀ v` is this vector. Each row comes with the
+/// component that it eliminates: Cholesky factorisation with pivoting on the largest remaining diagonal element, until
+/// only rounding remains (Golub and Van Loan, *Matrix Computations*, 4th ed., §4.2.8).
 pub fn factor<const N: usize>(
     mut matrix: [[f64; N]; N],
     mut vector: [f64; N],
@@ -41,7 +41,7 @@ pub fn factor<const N: usize>(
         let pivot = left.swap_remove(place);
         let root = matrix[pivot][pivot].sqrt();
         let mut row = [0.0; N];
-        // What was taken out before is exactly nothing.
+        // Components eliminated earlier are exactly zero.
         for &component in left.iter().chain([&pivot]) {
             row[component] = matrix[pivot][component] / root;
         }

@@ -14,22 +14,22 @@ pub const POSITION: usize = 6;
 /// Number of navigation states.
 pub const NAVIGATION: usize = 9;
 
-/// Index of each group of states. Those that move within a dwell come first: navigation errors, then the rotation at
+/// Index of each group of states. States that change within a dwell come first: navigation errors, then the rotation at
 /// rest.
 #[derive(Debug, Clone, PartialEq)]
 pub struct States {
-    /// Number of states that move within a dwell.
+    /// Number of states that change within a dwell.
     pub moving: usize,
     /// Error of the table position; `None` without a table.
     pub table: Option<usize>,
-    /// How far the instrument has slipped on the table, about body axes, and the table on the ground, about East, North
-    /// and Up; `None` without a table.
+    /// Slip of the instrument on the table, about body axes, and of the table on the ground, about East, North and Up;
+    /// `None` without a table.
     pub slips: Option<[usize; 2]>,
     /// Deviation of the biases of each triad from their mean.
     pub biases: PerSensor<usize>,
-    /// Error of Earth rate, by hand.
+    /// Error of Earth rate, without a table.
     pub earth_rate: Option<usize>,
-    /// Error of gravity, if there are several sites.
+    /// Gravity error, if there are several sites.
     pub gravity: Option<usize>,
     /// State of each quantity that differs between recordings.
     pub own: Vec<(usize, OwnState)>,
@@ -69,7 +69,7 @@ impl States {
         }
     }
 
-    /// The rotation at rest, by hand.
+    /// The rotation at rest, without a table.
     pub fn turn(&self) -> Option<usize> {
         (self.moving > NAVIGATION).then_some(NAVIGATION)
     }

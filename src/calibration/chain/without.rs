@@ -6,15 +6,16 @@ use super::Filtered;
 use super::states::NAVIGATION;
 use crate::calibration::{ParameterVector, Posterior, of_parameters};
 
-/// 1σ of a disturbance after which nothing is known of attitude in rad, velocity in m/s and position in m.
+/// 1σ of a disturbance that makes attitude (rad), velocity (m/s) and position (m) unknown.
 const WIDE: f64 = 100.0;
 
 impl Filtered<'_> {
-    /// 1σ of the parameters without each move in turn: before the dwell that follows, attitude, velocity and position
-    /// may have become anything.
+    /// 1σ of the parameters without each move in turn: before the next dwell, attitude, velocity and position become
+    /// unknown.
     ///
-    /// With such a disturbance δ, the information on the constants is `Λ − Eᵀ (N + W⁻²)⁻¹ E`, N and E being that on δ and
-    /// on both from all later rows (de Jong 1991, "The diffuse Kalman filter", Annals of Statistics 19(2)).
+    /// With such a disturbance δ, the information on the constants is `Λ − Eᵀ (N + W⁻²)⁻¹ E`, where N is the
+    /// information on δ, and E that on both, from all later rows (de Jong 1991, "The diffuse Kalman filter", Annals of
+    /// Statistics 19(2)).
     pub fn without_moves(&self, posterior: &Posterior) -> Vec<ParameterVector> {
         let mut sigma = Vec::new();
         self.backward(|number, cumulants| {

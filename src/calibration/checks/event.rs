@@ -20,17 +20,17 @@ use crate::units::{ARCSEC, DEG_PER_H, MICRO_G};
 pub enum EventKind {
     /// The table's readings in one dwell.
     Position,
-    /// A turn that the gyros did not sense.
+    /// A rotation that the gyros did not sense.
     Move,
     /// A change of velocity that the accelerometers did not sense.
     Velocity,
     /// A change of the biases of a triad.
     BiasStep(Sensor),
-    /// A turn that stays from then on: of the instrument on the table, or of the table on the ground.
+    /// A lasting rotation of the instrument on the table, or of the table on the ground.
     Slip(Slip),
 }
 
-/// An event larger than its effect, with heavy tails, produces by chance.
+/// An event too large to be produced by its effect by chance, in spite of the heavy tails.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Event {
     /// Kind.
@@ -62,9 +62,10 @@ struct Told {
 }
 
 impl Event {
-    /// The events of a problem that stand out. With its weight κ, the squares of an event's disturbances are `s` where `p`
-    /// is expected (of one, what the data tell of it); with the common variance they would be `s / p / (1 − p + p / κ)`
-    /// times what is expected. Student's tails make them a draw from Fisher's F.
+    /// The events of a problem that stand out. With the weight κ of an event, the squares of its disturbances are `s`,
+    /// and their expectation is `p` (the part, of one, that the data determine). With the common variance, the squares
+    /// would be `s / p / (1 − p + p / κ)` times their expectation. With Student's t as the distribution of events, this
+    /// ratio follows Fisher's F.
     pub(in crate::calibration) fn all(problem: &Problem, of: &Weighed) -> Vec<Self> {
         let told = told(of);
         let limit = -2.0 * (FALSE_ALARM / told.len().max(1) as f64).ln();
@@ -86,7 +87,7 @@ impl Event {
             })
         });
         let mut events: Vec<Self> = events.filter(|of| of.significance > of.limit).collect();
-        // By hand every move is another.
+        // By hand, every move is different.
         let table = problem.model.aiding == crate::run::Aiding::Table;
         events.retain(|of| table || !matches!(of.kind, EventKind::Velocity));
         events.sort_by_key(|event| event.dwell);
@@ -177,7 +178,7 @@ impl EventKind {
         first.map_or(0.0, |first| change.rows(first, 3).norm())
     }
 
-    /// Kind and words of the finding.
+    /// Kind and text of the finding.
     fn words(self, number: usize, time: f64, size: f64) -> (Kind, String) {
         let angle = angle(size);
         match self {

@@ -46,8 +46,8 @@ impl FormTest {
 }
 
 /// Tests the form of an estimate against the general form, linearised there (Van Trees, *Detection, Estimation, and
-/// Modulation Theory*, part I, §2.5). `None` for a form with as many angles as the general one, which no data can
-/// reject.
+/// Modulation Theory*, part I, §2.5). `None` for a form with as many angles as the general form, because no data can
+/// reject it.
 ///
 /// # Errors
 /// [`CalibrationError::Diverged`] if a covariance is not positive definite.

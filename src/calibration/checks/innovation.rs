@@ -92,7 +92,7 @@ impl Consistency {
 /// Mean normalised innovation squared.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Nis {
-    /// Mean per scalar observation; one if σ are correct, NaN without observations.
+    /// Mean per scalar observation; one if the σ are correct, NaN without observations.
     pub mean: f64,
     /// Number of scalar observations.
     pub count: usize,
@@ -102,11 +102,11 @@ pub struct Nis {
     pub lag_one: f64,
 }
 
-/// Selects the innovations in which a model error shows: their squares, with mean one if σ are correct.
+/// Selects the innovations that show a model error; returns their squares, with mean one if the σ are correct.
 type Squares = fn(&[&Innovation]) -> Vec<f64>;
 
-/// Innovations that are tested separately: words that follow the kind of observation, what to check if they are large,
-/// and the squares.
+/// Innovations that are tested separately: text that follows the kind of observation, the causes to check if the
+/// innovations are large, and their squares.
 const LOOKS: [(&str, &str, &str, Squares); 3] = [
     ("all", "", "the white noise in [imu.noise]", of_all),
     (
@@ -148,8 +148,8 @@ fn over_dwells(innovations: &[&Innovation]) -> Vec<f64> {
     summed.collect()
 }
 
-/// The finding on innovations that do not agree with their covariance, if any. `pulses`: the kinds of observation that
-/// contain remainders of pulses.
+/// The finding on innovations that do not agree with their covariance, if any. `pulses` are the kinds of observation
+/// that contain remainders of pulses.
 pub fn inconsistent(innovations: &[Innovation], pulses: &[Observation]) -> Option<Finding> {
     let of = |kind| innovations.iter().filter(move |i| i.observation == kind);
     let kinds = Observation::ALL.map(|kind| (kind, of(kind).collect::<Vec<_>>()));
@@ -162,8 +162,8 @@ pub fn inconsistent(innovations: &[Innovation], pulses: &[Observation]) -> Optio
             let squares = squares(of_kind);
             let count = squares.len();
             let nis = squares.iter().sum::<f64>() / count as f64;
-            // The distance of the IMU from the table's centre is stated by a bound, which makes the velocity after
-            // a move uncertain, and a pulse bounds its remainder, which may hardly vary: smaller innovations do not
+            // The distance of the IMU from the table centre is stated as a bound, so the velocity after a move is
+            // uncertain. A pulse bounds its remainder, which may hardly vary. Smaller innovations therefore do not
             // contradict the model.
             let one_sided = (look, *observation) == (AFTER_MOVES, Observation::Velocity)
                 || pulses.contains(observation);

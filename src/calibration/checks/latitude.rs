@@ -1,4 +1,4 @@
-//! Whether the gyros sense the Earth rate of the stated latitude.
+//! Test whether the gyros sense the Earth rate of the stated latitude.
 
 use nalgebra::Vector3;
 use serde_json::json;
@@ -35,7 +35,7 @@ pub fn earth_rate(problem: &Problem, outcome: &Outcome) -> Option<Finding> {
     let site = &problem.run().site;
     let sensed = site.earth_rate_n() + rate;
     let latitude = sensed.z.atan2(sensed.x.hypot(sensed.y));
-    // Earth rate to the east turns north; it tells no latitude.
+    // Earth rate to the east changes north; it gives no information on the latitude.
     let north = rate.x.atan2(sensed.y);
     let is_north = (latitude - site.latitude).abs() < north.abs();
     let off = if is_north {
@@ -72,7 +72,8 @@ fn of_north(north: f64) -> String {
     )
 }
 
-/// Latitudes as sensed and as stated; the error of the accelerometers' scale factors by gravity, and over its σ.
+/// Sensed and stated latitude; the error of the accelerometer scale factors due to gravity, and this error divided by
+/// its σ.
 fn of_latitude(latitudes: [f64; 2], (off, sigmas): (f64, f64)) -> String {
     let [sensed, stated] = latitudes.map(|of| value(of / DEGREE, 1.0));
     let gravity = if off > 0.0 {
@@ -90,7 +91,8 @@ fn of_latitude(latitudes: [f64; 2], (off, sigmas): (f64, f64)) -> String {
     )
 }
 
-/// Relative error of gravity if it was taken from the stated latitude and another one is right; zero if gravity is stated.
+/// Relative error of gravity, if it was computed from the stated latitude but another latitude is right; zero if
+/// gravity is stated.
 fn by_gravity(site: &Site, latitude: f64) -> f64 {
     let [taken, right] = [site.latitude, latitude].map(|of| normal_gravity(of, site.height));
     if (taken - site.gravity).abs() <= site.gravity_sigma {

@@ -1,4 +1,4 @@
-//! Checks of model, noise and record by the data: each file is a check with its messages.
+//! Checks of model, noise and recording against the data: each file contains one check with its messages.
 
 pub mod event;
 pub mod finding;
@@ -22,21 +22,21 @@ use event::Event;
 use finding::Finding;
 use term::TermEvidence;
 
-/// Findings of all checks of a filter's outcome; causes before their possible consequences. `problem` is the problem as
-/// stated.
+/// Findings of all checks of a filter outcome; causes come before their possible consequences. `problem` is the problem
+/// as stated.
 pub fn findings(problem: &Problem, outcome: &Outcome) -> Vec<Finding> {
     let (estimate, innovations) = (&outcome.estimate, &outcome.innovations);
     let rounding = rounding::by_rounding(problem, &estimate.triads);
     let form = outcome
         .form_test
         .and_then(|test| test.finding(estimate.form()));
-    // Angles that the form lacks are a cause that is found.
+    // Angles missing from the form are one of the causes that can be found.
     let unexplained = match form {
         Some(_) => None,
         None => unexplained::unexplained(&outcome.consistency.all, innovations),
     };
     let of_noise = rest_scatter::scatter_at_rest(problem, &estimate.triads);
-    // Noise stated too small makes events, terms and innovations of itself.
+    // If the stated noise is too small, noise appears as events, terms and innovations.
     let by_noise = of_noise.iter().any(|finding| finding.level() > Level::Note);
     let far = prior_distance::far_from_prior(&problem.model, estimate);
     let not_observed = observability::not_observed_by_path(outcome, far.as_ref());

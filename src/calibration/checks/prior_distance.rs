@@ -12,7 +12,7 @@ use crate::imu::{AXES, ParameterKind, PerSensor, Sensor, Triad};
 use crate::statistics::{FALSE_ALARM, chi_square_limit};
 use crate::units::{DEGREE, PPM};
 
-/// Parameters farther from their prior than this many of its σ contradict it.
+/// Parameters farther from their prior than this many prior σ contradict it.
 const CONTRADICTS: f64 = 5.0;
 /// Fraction of the prior variance by which rounding changes unobserved parameters.
 const ROUNDING: f64 = 1e-9;
@@ -50,7 +50,7 @@ pub fn far_from_prior(model: &Model, estimate: &Estimate) -> Option<Finding> {
     (!far.is_empty()).then(|| Finding::new(kind, text, figures))
 }
 
-/// Whether a parameter is a scale factor too far from its prior for a careless prior.
+/// Whether a parameter is a scale factor whose distance from the prior cannot be explained by a careless prior.
 fn is_another_scale(model: &Model, estimate: &Estimate, index: usize) -> bool {
     let (_, of_triad) = sensor_and_parameter(index);
     let factor = estimate.vector()[index] / model.prior_mean[index];
@@ -60,9 +60,10 @@ fn is_another_scale(model: &Model, estimate: &Estimate, index: usize) -> bool {
 
 /// The finding on parameters for which the data alone contradict the prior, if the estimate includes the prior.
 ///
-/// Too tight a prior constrains the estimate, so its distance alone is not informative. With `P⁻¹ = S⁻¹ + V⁻¹` of prior
-/// and data, the distance of the estimate is `P V⁻¹` times that of the data, and its covariance for a correct prior is
-/// `P S⁻¹ P V⁻¹ = S − P`: normalised, it equals the distance of data and prior over both σ.
+/// A prior that is too tight constrains the estimate, so the distance of the estimate alone is not informative. With
+/// `P⁻¹ = S⁻¹ + V⁻¹` of prior and data, the distance of the estimate is `P V⁻¹` times that of the data, and its
+/// covariance for a correct prior is `P S⁻¹ P V⁻¹ = S − P`: normalised, it equals the distance of data and prior over
+/// both σ.
 pub fn far_by_data(model: &Model, estimate: &Estimate) -> Option<Finding> {
     let mut by_data = estimate.vector();
     let mut sigma = estimate.sigma();
@@ -73,7 +74,7 @@ pub fn far_by_data(model: &Model, estimate: &Estimate) -> Option<Finding> {
             continue;
         }
         by_data[i] = model.prior_mean[i] + off / share;
-        // Both σ together are those of the distance over the share that the data have in it.
+        // Both σ together equal that of the distance, divided by the weight of the data in the estimate.
         sigma[i] = prior * (share.recip() - 1.0).max(0.0).sqrt();
     }
     let by_data = Estimate {
@@ -84,8 +85,8 @@ pub fn far_by_data(model: &Model, estimate: &Estimate) -> Option<Finding> {
 }
 
 /// The model with a prior widened so that its estimate does not contradict it: σ of every parameter is at least its
-/// distance. `None` if nothing contradicts the prior. A wrong prior would turn correct observations into outliers,
-/// and its own error into noise.
+/// distance. `None` if nothing contradicts the prior. With a wrong prior, correct observations would become outliers,
+/// and the error of the prior would become noise.
 pub fn widened(model: &Model, estimate: &Estimate) -> Option<Model> {
     let off = estimate.vector() - model.prior_mean;
     let known: Vec<usize> = estimate
@@ -103,8 +104,8 @@ pub fn widened(model: &Model, estimate: &Estimate) -> Option<Model> {
     contradicted.then_some(widened)
 }
 
-/// The parameters that contradict their prior. Their own σ is added to the prior's, because an estimate may
-/// be made without the prior.
+/// The parameters that contradict their prior. Their own σ is added to the prior σ, because the estimate may not
+/// include the prior.
 fn far(model: &Model, estimate: &Estimate) -> Vec<usize> {
     let sigma = estimate.sigma();
     let off = estimate.vector() - model.prior_mean;

@@ -56,7 +56,7 @@ pub struct DwellResidual {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Residuals {
     dwells: Vec<DwellResidual>,
-    /// rad
+    /// Direction residuals, rad.
     turns: Vec<f64>,
 }
 
@@ -103,7 +103,7 @@ pub struct Measures {
     #[serde(rename = "gravity_m_s2")]
     pub gravity: Spread,
     /// Angle in each dwell between the directions of gravity from the accelerometers and from the gyros, propagated
-    /// from the dwell before, rad.
+    /// from the previous dwell, rad.
     #[serde(rename = "direction_rad")]
     pub direction: Spread,
     /// Error of the gyros over a turn between two readings of the table, or about the axis of a
@@ -166,7 +166,7 @@ impl Outcome {
             script, effects, ..
         } = &*self.solved;
         let enough = every_other(problem).is_some();
-        // Half the dwells may be too few.
+        // Half of the dwells may be too few.
         let half = enough.then_some(()).and_then(|()| {
             let chain = effects.chain(problem, script).ok()?;
             let half = chain.observed_in(|dwell| dwell % 2 == 0);
@@ -175,7 +175,7 @@ impl Outcome {
             Some(moved)
         });
         let held_out = half.map(|half| residuals(problem, &half, |k| k % 2 == 1));
-        // Only the instrument differs, not the attitudes.
+        // Only the instrument differs; the attitudes are the same.
         let nominal = nominal(self.solved.estimate.initial_attitudes.clone());
         let before = residuals(problem, &nominal, |_| true)?;
         let all = self.residuals(problem)?;
@@ -213,7 +213,7 @@ impl ClosedForm {
             Reference::Labels => None,
             reference => {
                 let half = every_other(problem);
-                // Half the positions may be too few.
+                // Half of the positions may be too few.
                 let half = half.and_then(|half| six_position_by(reference, &half).ok());
                 let half = half.map(|half| of(&half.estimate.triads, &|k| k % 2 == 1));
                 half.transpose()?
@@ -227,7 +227,7 @@ impl ClosedForm {
     }
 }
 
-/// An instrument as nominal as its scales, with these first attitudes.
+/// A nominal instrument, with these first attitudes.
 fn nominal(initial_attitudes: Vec<Matrix3<f64>>) -> Linearisation {
     let triads = PerSensor::from_fn(|_| Triad::ideal(InstallationForm::General));
     Linearisation::new(triads, TermVector::zeros(), initial_attitudes)
@@ -354,8 +354,8 @@ fn navigate(
     Ok(block.state.attitude)
 }
 
-/// Iterations for the force: a term changes the force on which it depends by a hundredth at most, so the error
-/// is a millionth of it.
+/// Iterations for the force: a term changes the force on which it depends by at most a hundredth, so the remaining
+/// error is a millionth of the force.
 const ROUNDS: usize = 3;
 
 /// Mean specific force along body axes over a dwell, with an approximate attitude, m/s².

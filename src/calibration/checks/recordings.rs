@@ -22,7 +22,7 @@ pub struct RecordingDifference {
 }
 
 impl RecordingDifference {
-    /// The difference of a group, found at a logarithm over the usual size; without its test.
+    /// The difference of a group, given the logarithm of its size over the usual size; the test is not filled in.
     pub(in crate::calibration) fn new(
         group: Group,
         model: &Model,
@@ -52,8 +52,8 @@ pub fn recordings_differ(differences: &[RecordingDifference]) -> Option<Finding>
     let each: Vec<String> = differences.iter().map(one).collect();
     let text = format!(
         "The recordings differ by more than their σ and [day_to_day] allow. turncal estimated the difference ({}) and \
-         included it in σ. Usual causes: bias changes at switch-on, remounting (set mounting_arcsec), or a temperature \
-         sensor away from the inertial sensors.",
+         included it in the σ. Usual causes: bias changes at switch-on, remounting (set mounting_arcsec), or a \
+         temperature sensor away from the inertial sensors.",
         each.join(", ")
     );
     let figures = json!({ "differences": differences });

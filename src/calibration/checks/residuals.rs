@@ -1,4 +1,4 @@
-//! Residuals of least squares of dwells and moves, compared with the stated errors.
+//! Least-squares residuals of dwells and moves, compared with the stated errors.
 
 use serde_json::json;
 
@@ -14,7 +14,7 @@ const TRIADS: f64 = 2.0;
 pub struct Residuals {
     /// Sum of squared whitened residuals.
     pub chi_square: f64,
-    /// Number of equations beyond those that the unknowns need.
+    /// Number of equations minus number of unknowns.
     pub degrees: usize,
     /// Start and end, s, of the dwell or move with the largest residuals.
     pub worst: [f64; 2],
@@ -34,12 +34,12 @@ impl Residuals {
         chi_square_limit(self.degrees as f64, FALSE_ALARM / TRIADS)
     }
 
-    /// Whether they are beyond chance.
+    /// Whether the residuals are larger than chance explains.
     pub fn are_large(&self) -> bool {
         self.chi_square > self.limit()
     }
 
-    /// The finding on residuals of `gyro`, `accel` or `both triads` beyond chance.
+    /// The finding on residuals of `gyro`, `accel` or `both triads` that are larger than chance explains.
     pub fn finding(&self, of: &str) -> Option<Finding> {
         let Self {
             chi_square,
@@ -49,9 +49,9 @@ impl Residuals {
         let (limit, growth) = (self.limit(), self.growth());
         let text = format!(
             "The static fit of {of} is poor (χ² {chi_square:.0} with {degrees} degrees of freedom; limit {limit:.0}). \
-             turncal widened σ {}. The worst interval is {begin:.1}–{end:.1} s. Look there for a bump, a wrong label or \
-             a wrong attitude; otherwise check the noise figures in [imu.noise], the level and north of the table in \
-             [turntable], and whether the sensor was really still.",
+             turncal widened the σ {}. The worst interval is {begin:.1}–{end:.1} s. Look there for a bump, a wrong \
+             label or a wrong attitude; otherwise check the noise figures in [imu.noise], the level and north of the \
+             table in [turntable], and whether the sensor was really still.",
             widened_by(growth)
         );
         let figures = json!({

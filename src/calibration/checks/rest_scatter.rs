@@ -13,18 +13,18 @@ use crate::number::three_digits;
 use crate::run::{Dwell, Run};
 use crate::statistics::FALSE_ALARM;
 
-/// Largest error of the difference of two neighbouring increments by pulses: a second difference of remainders, each
-/// half a pulse at most.
+/// Largest error that pulses cause in the difference of two neighbouring increments: a second difference of remainders,
+/// each half a pulse at most.
 const PULSES: f64 = 2.0;
 /// A scatter smaller than this part of the stated noise is shown as zero.
 const NO_NOISE: f64 = 1e-3;
 
-/// Findings on triads with a scatter at rest that does not agree with the noise that the user insists on. Calibrated
-/// inputs are used, because a wrong prior scale factor is not noise.
+/// Findings on triads with scatter at rest that disagrees with the noise imposed by the user (`NoisePolicy::Stated`).
+/// Calibrated inputs are used, because a wrong prior scale factor is not noise.
 ///
-/// A step lasts a tenth of a second, as in the filter: faster errors average out, and of slower ones only random walk,
-/// bias and vibration of the mount remain. The result does not change the calibration, because it does not distinguish
-/// between them.
+/// A step lasts a tenth of a second, as in the filter: faster errors average out, and only random walk, bias and
+/// vibration of the mount remain. The result does not change the calibration, because it does not distinguish between
+/// these three causes.
 pub fn scatter_at_rest(problem: &Problem, calibrated: &PerSensor<Triad>) -> Vec<Finding> {
     let runs = problem.runs().enumerate();
     let each = runs.flat_map(|(recording, run)| Sensor::ALL.map(|sensor| (recording, run, sensor)));
@@ -52,7 +52,7 @@ fn of_triad<'a>(
     let step = length as f64 * imu.period;
     let (mut squares, mut count) = (0.0, 0usize);
     for dwell in dwells {
-        // Pairs that have no step in common, so that each is new.
+        // Pairs that have no step in common, so that they are independent.
         let mut sums = imu.of(sensor).sums(dwell.samples.clone(), length);
         while let (Some(before), Some(after)) = (sums.next(), sums.next()) {
             squares += (correction * (after - before)).norm_squared();
@@ -98,7 +98,7 @@ fn of_triad<'a>(
     beyond.then(|| Finding::new(Kind::ScatterAtRest, text, figures).of_growth(ratio))
 }
 
-/// The estimated figure relative to the stated one, in words, and the figure.
+/// The estimated figure relative to the stated one, in words, and as a number.
 fn compared(found: f64, ratio: f64) -> (String, String) {
     let shown = three_digits(found);
     match ratio {

@@ -2,8 +2,8 @@
 //!
 //! If nothing moves the value over the edge of a step, the rounding error is the same in every row, and averaging does
 //! not reduce it. With noise of σ, the remaining error is a sum of sine waves of the value, the k-th of amplitude
-//! step/πk · exp(−2π²k²σ²/step²) (Widrow and Kollár, *Quantization Noise*, 2008, on dither). The place of the value
-//! within a step is unknown, so half their squares add up. With σ of half a step, the remaining error is negligible.
+//! step/πk · exp(−2π²k²σ²/step²) (Widrow and Kollár, *Quantization Noise*, 2008, on dither). The position of the value
+//! within a step is unknown, so half of their squares add up. With σ of half a step, the remaining error is negligible.
 
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
@@ -54,8 +54,8 @@ pub fn rounded(
         };
         let step = steps.fold(0.0, f64::max) / value;
         let text = format!(
-            "{} values are rounded to {step:.2e} {unit}, coarser than their noise, so averaging cannot recover \
-             where within a step they are. turncal widened σ {}. Log more digits.",
+            "{} values are rounded to {step:.2e} {unit}, coarser than their noise, so averaging cannot recover their \
+             position within a step. turncal widened the σ {}. Log more digits.",
             triad_name(sensor),
             widened_by(growth)
         );
@@ -149,7 +149,7 @@ fn of_recording(problem: &Problem, recording: usize, run: &Run, sensor: Sensor) 
         .iter()
         .filter(|of| of.recording == recording);
     for dwell in stretches.flat_map(|stretch| &stretch.dwells) {
-        // Pairs that have no row in common, so that each is new.
+        // Pairs that have no row in common, so that they are independent.
         let mut rows = imu.of(sensor).sums(dwell.samples.clone(), 1);
         let (mut sum, mut summed) = (Vector3::zeros(), 0.0f64);
         while let (Some(before), Some(after)) = (rows.next(), rows.next()) {
@@ -185,7 +185,8 @@ fn left(step: f64, scatter: f64, stated: f64) -> f64 {
     }
     let square = step * step;
     let seen = (scatter / square - 1.0 / 12.0).max(0.0);
-    // Two values scatter by a quarter of a step's square at most, however little noise takes them from one to the other.
+    // The variance of two values is at most a quarter of the squared step, however little noise causes the change from
+    // one to the other.
     let noise = if scatter > 0.25 * square {
         seen
     } else {

@@ -1,4 +1,4 @@
-//! Whether the table settles after its stops.
+//! Test whether the table settles after its stops.
 
 use serde_json::json;
 
@@ -18,8 +18,8 @@ pub fn settles(problem: &Problem, outcome: &Outcome) -> Option<Finding> {
     let is_larger = log > 0.0 && (log / sigma).powi(2) > chi_square_limit(1.0, FALSE_ALARM);
     let size = three_digits(found.used);
     let text = format!(
-        "After a stop, the attitude of the table differs from its reading by {size} {} (1σ), which fades within \
-         seconds. turncal estimated this angle, and σ include it. Wait longer after each stop, or state \
+        "After a stop, the table attitude differs from its reading by an error of initially {size} {} (1σ) that fades \
+         within seconds. turncal estimated this error, and the σ include it. Wait longer after each stop, or state \
          settling_sigma_arcsec in [turntable].",
         found.unit
     );

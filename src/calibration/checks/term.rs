@@ -11,7 +11,7 @@ use crate::calibration::{
 use crate::number::three_digits;
 use crate::statistics::FALSE_ALARM;
 
-/// A term that a path does not show is named if it widens the σ of a group by more than this.
+/// A term that a path does not show is reported if it increases the σ of a group by more than this factor.
 const NAMED: f64 = 1.25;
 
 /// Whether a candidate, absent with this probability, counts as present among this many candidates.
@@ -69,7 +69,7 @@ impl TermEvidence {
             } else {
                 of.known.effect_of(&candidates)?.1
             };
-            // Next to certain is not certain.
+            // Almost certain is not certain.
             let most = 1.0 - f64::EPSILON;
             Some(Self {
                 shown: absent.is_some_and(|absent| is_shown(absent, count)),
@@ -82,7 +82,7 @@ impl TermEvidence {
         terms.collect()
     }
 
-    /// The findings on terms that were not asked for: one on those that are present, one on those that are not shown.
+    /// The findings on terms that were not requested: one on terms that are present, one on terms that are not shown.
     pub(in crate::calibration) fn findings(all: &[Self]) -> Vec<Finding> {
         let candidates = all.iter().filter(|of| of.present < 1.0);
         let (shown, others): (Vec<&Self>, Vec<&Self>) = candidates.partition(|of| of.shown);
@@ -96,7 +96,7 @@ impl TermEvidence {
             .collect()
     }
 
-    /// The group whose σ the term widens most.
+    /// The group whose σ the term increases most.
     pub fn widest(&self) -> Option<(Group, f64)> {
         let groups = Group::all().zip(self.sigma_factors);
         let groups = groups.filter_map(|(group, factor)| Some((group, factor?)));
@@ -104,7 +104,7 @@ impl TermEvidence {
     }
 }
 
-/// The finding on terms that the data show, if any. Of two that are alike, the data show one or the other.
+/// The finding on terms that the data show, if any. If two terms are alike, the data show one or the other.
 fn estimated(shown: &[&TermEvidence]) -> Option<Finding> {
     let groups = shown.chunk_by(|one, other| one.term.alike() == other.term.alike());
     let names = groups.map(|group| {
@@ -122,7 +122,7 @@ fn estimated(shown: &[&TermEvidence]) -> Option<Finding> {
     (!shown.is_empty()).then(finding)
 }
 
-/// The finding on terms that the recording does not show although they widen σ, if any.
+/// The finding on terms that the recording does not show but that increase σ, if any.
 fn not_shown(terms: &[&TermEvidence]) -> Option<Finding> {
     let each = terms.iter().filter_map(|of| {
         let (group, factor) = of.widest()?;
@@ -149,7 +149,7 @@ fn figures(terms: &[&TermEvidence]) -> Value {
     json!({ "terms": each.collect::<Value>() })
 }
 
-/// σ of each group over that if the constants at these places were known.
+/// σ of each group, divided by its σ if the constants at these positions were known.
 fn factors(posterior: &Posterior, places: &[usize]) -> [Option<f64>; 6] {
     let covariance = &posterior.covariance;
     let across = covariance.select_columns(places);

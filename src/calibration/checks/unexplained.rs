@@ -1,4 +1,4 @@
-//! Results that must not be used: without convergence, or with residuals that no noise figure explains.
+//! Tests for results that must not be used: without convergence, or with residuals that no noise figure explains.
 
 use serde_json::json;
 
@@ -10,13 +10,13 @@ use crate::statistics::chi_square_limit;
 /// Probability that a stated figure is wrong by more than the accepted limit.
 const SO_WRONG: f64 = 1e-2;
 
-/// Residuals above this part of gravity, or of a turn, are those of no sensor.
+/// Residuals above this fraction of gravity, or of a turn, do not occur in any sensor.
 const ABSURD: f64 = 0.01;
 
 /// Limit of NIS, or of χ² over its degrees of freedom.
 ///
-/// 1σ of a stated noise figure is a factor of three, as everywhere in noise estimation. Its error exceeds the limit of
-/// NIS, its square, in one case of a hundred. Beyond that, the samples do not match the model.
+/// 1σ of a stated noise figure is a factor of three, as everywhere in noise estimation. In one case in a hundred, its
+/// error squared exceeds this limit of NIS. Beyond that, the samples do not match the model.
 fn limit() -> f64 {
     let sigmas = chi_square_limit(1.0, 2.0 * SO_WRONG).sqrt();
     (2.0 * LOG_SIGMA * sigmas).exp()
@@ -51,8 +51,8 @@ pub fn absurd(problem: &Problem, outcome: &Outcome) -> Option<Finding> {
     let (name, middle) = worst.max_by(|one, other| one.1.total_cmp(&other.1))?;
     let percent = format!("{} %", three_digits(100.0 * middle));
     let text = format!(
-        "Calibration rejected: in the median dwell {}, more than any sensor is wrong after calibration. Do not use the \
-         values or σ. Check units, axes and rate in run.toml with turncal check.",
+        "Calibration rejected: in the median dwell {}, more than the error of any sensor after calibration. Do not use \
+         the values or σ. Check units, axes and rate in run.toml with turncal check.",
         name.replace("{}", &percent)
     );
     let figures = json!({ "median": middle, "limit": ABSURD });
@@ -77,7 +77,7 @@ pub fn unexplained_residuals(findings: &[Finding]) -> Option<Finding> {
     })
 }
 
-/// The finding, if this mean of squares exceeds the limit; the largest square is at this time, s.
+/// The finding, if this mean square exceeds the limit; the largest square is at this time, s.
 fn rejected(name: &str, nis: f64, worst: f64) -> Option<Finding> {
     let limit = limit();
     let text = format!(

@@ -83,7 +83,7 @@ impl Constant {
             return stated;
         }
         match self {
-            // A latitude is easily stated wrong by a degree.
+            // A stated latitude is easily wrong by a degree.
             Self::EarthRate(_) if model.may_be_elsewhere => ROTATION_RATE * DEGREE,
             _ => {
                 let term = self.error_term();
@@ -93,7 +93,7 @@ impl Constant {
         }
     }
 
-    /// Usual size as one of an error term.
+    /// Usual size as a parameter of an error term.
     fn usual_size(self, term: ErrorTerm, model: &Model) -> f64 {
         match (term, self) {
             (ErrorTerm::Instrument(of), _) => of.usual_size(&model.noise),

@@ -9,7 +9,7 @@ use crate::calibration::{Constant, ParameterVector, Posterior, Prior};
 #[derive(Debug, Clone)]
 pub struct Known {
     prior: Prior,
-    /// Free constants, and constants fixed at their mean by the prior.
+    /// Indices of free constants, and of constants fixed at their mean by the prior.
     open: Vec<usize>,
     fixed: Vec<usize>,
     /// Rows of the free constants, with their measured values: an upper triangle.
@@ -32,7 +32,7 @@ pub struct Sites {
 }
 
 impl Known {
-    /// The prior, before any data; constants that may be absent have none yet.
+    /// The prior, before any data; constants that may be absent have no prior yet.
     pub fn new(prior: Prior) -> Self {
         let all = 0..prior.sigma.len();
         let (open, fixed): (Vec<usize>, Vec<usize>) = all.partition(|&k| prior.sigma[k] > 0.0);
@@ -50,7 +50,7 @@ impl Known {
         }
     }
 
-    /// Adds rows of all constants.
+    /// Adds rows with coefficients of all constants.
     pub fn learn(&mut self, rows: &DMatrix<f64>) {
         let (n, all) = (self.open.len(), self.prior.sigma.len());
         let mut with = DMatrix::zeros(n + 1 + rows.nrows(), n + 1);
@@ -85,8 +85,8 @@ impl Known {
         root.solve_upper_triangular_mut(&mut by).then_some(by)
     }
 
-    /// Root mean square change of the parameters of both triads by the candidates at these places, each of its usual size;
-    /// and the largest remaining part of that size, if nothing else that may be absent is there.
+    /// Root mean square change of the parameters of both triads due to the candidates at these positions, each of its
+    /// usual size; and the largest remaining fraction of this size if all other candidates are absent.
     pub fn effect_of(&self, places: &[usize]) -> Option<(ParameterVector, f64)> {
         let (n, m) = (self.open.len(), self.prior.candidates);
         let all = self.prior.sigma.len();
@@ -166,8 +166,8 @@ impl Known {
         ))
     }
 
-    /// Mean and root of the covariance of combinations of the constants, each given by a row of weights; those that may
-    /// be absent must have rows of their own.
+    /// Mean and square root of the covariance of combinations of the constants. Each combination is a row of weights;
+    /// constants that may be absent must have their own rows.
     pub fn through(&self, weights: &DMatrix<f64>) -> (DVector<f64>, DMatrix<f64>) {
         let n = self.open.len();
         let mut across = weights.select_columns(&self.open).transpose();
@@ -185,7 +185,7 @@ impl Known {
 }
 
 impl Sites {
-    /// All constants known at their prior mean, to a millionth of their usual size.
+    /// Makes all constants known at their prior mean, to a millionth of their usual size.
     pub fn certain(prior: &Prior) -> Self {
         let (n, m) = (prior.sigma.len(), prior.candidates);
         let information = prior
@@ -220,10 +220,10 @@ impl Sites {
     }
 }
 
-/// Inverse of a positive-definite matrix, whatever the units of its components, and the logarithm of its determinant.
+/// Inverse of a positive-definite matrix, for any units of its components, and its log-determinant.
 pub fn inverse(matrix: &DMatrix<f64>) -> Option<(DMatrix<f64>, f64)> {
     let n = matrix.nrows();
-    // With a diagonal of ones.
+    // Scaled so that the diagonal is one.
     let scale = matrix.diagonal().map(|value| value.sqrt().recip());
     let scaled = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] * scale[i] * scale[j]);
     let root = Cholesky::new(scaled)?;
@@ -233,7 +233,7 @@ pub fn inverse(matrix: &DMatrix<f64>) -> Option<(DMatrix<f64>, f64)> {
     Some((inverse, 2.0 * logarithms))
 }
 
-/// The upper-triangular R with `RᵀR = AᵀA`, A consisting of these rows, by Householder reflections.
+/// The upper-triangular R with `RᵀR = AᵀA`, where A consists of these rows, by Householder reflections.
 pub fn triangle(rows: &DMatrix<f64>) -> DMatrix<f64> {
     let rows = MatRef::from_column_major_slice(rows.as_slice(), rows.nrows(), rows.ncols());
     let qr = rows.qr();

@@ -27,7 +27,7 @@ pub struct Posterior {
 }
 
 impl Posterior {
-    /// The posterior of constants; `shrinking` is the logarithm of the squared ratio of prior to posterior volume.
+    /// The posterior of constants; `shrinking` is the log of the squared ratio of prior volume to posterior volume.
     pub fn new(
         constants: &[Constant],
         mean: DVector<f64>,

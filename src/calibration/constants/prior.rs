@@ -7,13 +7,13 @@ use nalgebra::{DMatrix, DVector};
 use crate::calibration::budget::source::BudgetSource;
 use crate::calibration::{Candidate, Constant, Linearisation, Model, Posterior, to_vector};
 
-/// The prior of constants, as errors of the linearisation point.
+/// The prior of constants, expressed as errors of the linearisation point.
 #[derive(Debug, Clone)]
 pub struct Prior {
     /// The constants, those that may be absent last.
     pub constants: Vec<Constant>,
     pub mean: DVector<f64>,
-    /// 1σ of each; zero for constants fixed at their mean. For those that may be absent, their usual size.
+    /// 1σ of each constant; zero for constants fixed at their mean. For constants that may be absent, their usual size.
     pub sigma: DVector<f64>,
     /// Number of constants that may be absent.
     pub candidates: usize,
@@ -41,7 +41,7 @@ impl Prior {
         }
     }
 
-    /// Exact contribution to a covariance, by source: `P P₀⁻¹ P`; without those that may be absent.
+    /// Exact contribution to a covariance, by source: `P P₀⁻¹ P`; without the constants that may be absent.
     pub fn parts(&self, of: &Posterior) -> BTreeMap<BudgetSource, DMatrix<f64>> {
         let n = self.constants.len();
         let mut parts = BTreeMap::new();

@@ -15,7 +15,7 @@ pub const BY_HAND: [Source; 3] = [
     Source::RotationAtRest,
 ];
 
-/// Share of each of [`BY_HAND`] in the errors, for unit σ in SI and radians.
+/// Variance that each of [`BY_HAND`] adds to each error, for unit σ in SI and radians.
 pub type Parts = [DVector<f64>; BY_HAND.len()];
 
 /// Additional noise that makes the errors more likely than the stated noise.
@@ -43,7 +43,7 @@ impl ByHand {
             }
             of_errors(errors, sum, &parts[place])
         };
-        // Of −2 ln of the likelihood ratio of one additional source.
+        // Limit of −2 ln of the likelihood ratio for one additional source.
         let limit = limit(0, 1, FALSE_ALARM / BY_HAND.len() as f64);
         let (found, _) = likeliest(BY_HAND.len(), limit, slope)?;
         Some(Self { found })
@@ -88,7 +88,7 @@ fn add(covariance: &mut DMatrix<f64>, parts: &DVector<f64>, variance: f64) {
     }
 }
 
-/// The likelihood of errors under a covariance, and its slope with respect to a variance with these parts.
+/// The likelihood of errors with a covariance, and its slope with respect to a variance with these parts.
 fn of_errors(
     errors: &DVector<f64>,
     covariance: DMatrix<f64>,

@@ -14,7 +14,7 @@ pub fn limit(two_sided: usize, one_sided: usize, false_alarm: f64) -> f64 {
         let mut weight = 0.5f64.powi(one_sided as i32);
         let mut chance = 0.0;
         for above in 0..=one_sided {
-            // No degree of freedom is always zero.
+            // χ² with no degree of freedom is always zero.
             if let Ok(chi2) = ChiSquared::new((two_sided + above) as f64) {
                 chance += weight * chi2.sf(limit);
             }

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum NoisePolicy {
-    /// Use the noise that run.toml and models state
+    /// Use the noise stated in run.toml and models
     Stated,
     /// Estimate the noise from the recording, with the stated noise as prior
     #[default]
@@ -19,7 +19,7 @@ impl NoisePolicy {
     /// All policies.
     pub const ALL: [Self; 3] = [Self::Stated, Self::Auto, Self::Learnt];
 
-    /// The name that command line and files use.
+    /// The name used on the command line and in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Stated => "stated",

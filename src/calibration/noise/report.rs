@@ -35,11 +35,11 @@ pub struct NoiseTest {
     /// Limit of the squared distance for correct stated noise (χ², p < 0.001 over all figures).
     #[serde(rename = "ratio_limit")]
     pub limit: f64,
-    /// Whether a stated figure is too small by more than half beyond this limit.
+    /// Whether a stated figure beyond this limit is too small by a factor of more than 1.5.
     pub rejected: bool,
 }
 
-/// 1σ of a source, in the unit named.
+/// 1σ of a source, in the given unit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SourceFigures {
     /// The source.
@@ -147,11 +147,11 @@ fn symbol(unit: &str) -> String {
     })
 }
 
-/// A finding names a stated figure if the estimate is more than this many times as large.
+/// A finding lists a stated figure if the estimate is more than this many times as large.
 pub const NAMED: f64 = 1.5;
 
-/// The finding on estimated noise: the squared distance of the worst stated figure, and its limit. `None` if no noise was
-/// stated.
+/// The finding on estimated noise, with the squared distance of the worst stated figure and its limit. `None` if no
+/// noise was stated.
 fn noise_learnt(
     problem: &Problem,
     (ratio, limit): (f64, f64),

@@ -53,7 +53,7 @@ macro_rules! sources {
     };
 }
 
-// Noise of moves by speed is over the root of ∫|ω|² dt in rad²/s or ∫|a|² dt in m²/s³.
+// Noise of moves by speed is divided by the root of ∫|ω|² dt in rad²/s or ∫|a|² dt in m²/s³.
 sources! {
     AngleRandomWalk, Gyro, "angle random walk" in "deg/sqrt(h)" = DEG_PER_SQRT_H,
         "imu.noise" GYRO.random_walk, part of White(Gyro);
@@ -98,7 +98,7 @@ impl Source {
         noise
     }
 
-    /// Whether the run states a nonzero figure for it.
+    /// Whether the run states a nonzero figure for this source.
     pub(in crate::calibration) fn stated(self, problem: &Problem) -> bool {
         let of_dwells = problem.run().standstill.sigma.get(self.triad());
         let seen = matches!(self, Self::Velocity | Self::Attitude) && of_dwells.is_none();

@@ -1,10 +1,10 @@
 //! Maximum-likelihood variance components, added one by one while the gain is significant.
 
-/// Longest step of ln of a variance.
+/// Longest step of the log of a variance.
 const LONGEST: f64 = 3.0;
-/// A step of ln of a variance below this part of its σ counts as converged.
+/// A step of the log of a variance below this fraction of its σ counts as converged.
 const SETTLED: f64 = 0.01;
-/// Most steps.
+/// Maximum number of steps.
 const STEPS: usize = 40;
 
 /// One component.
@@ -22,7 +22,7 @@ pub struct Component {
 pub struct Slope {
     /// −2 ln of the likelihood, up to a constant.
     pub deviance: f64,
-    /// Gradient of ln of the likelihood with respect to that variance.
+    /// Gradient of the log-likelihood with respect to that variance.
     pub score: f64,
     /// Expected information.
     pub information: f64,
@@ -57,7 +57,7 @@ pub fn likeliest(
 }
 
 /// Sets the variances to their maximum-likelihood values, and returns −2 ln of the likelihood; `None` if one is zero.
-/// The last one starts from zero.
+/// The last variance starts from zero.
 ///
 /// Source: Fisher scoring of the likelihood of components of variance, Patterson and Thompson 1971, Biometrika 58(3);
 /// applied to one after the other.

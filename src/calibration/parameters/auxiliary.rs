@@ -67,7 +67,7 @@ pub fn auxiliary_vector(
     all
 }
 
-/// Correlation beyond which two terms are not distinguished.
+/// Correlation beyond which two terms cannot be distinguished.
 const INSEPARABLE: f64 = 0.99;
 
 /// Estimates of the auxiliary parameters; all figures of a disabled one are zero.
@@ -77,9 +77,9 @@ pub struct Auxiliary {
     pub values: AuxiliaryVector,
     /// Covariance of the estimates, [`AUXILIARY`] square.
     pub covariance: DMatrix<f64>,
-    /// Covariance of the parameters of both triads (rows) with them.
+    /// Covariance of the parameters of both triads (rows) with the estimates.
     pub cross: DMatrix<f64>,
-    /// Prior 1σ of each, around zero.
+    /// Prior 1σ of each, with mean zero.
     pub prior_sigma: AuxiliaryVector,
 }
 
@@ -128,7 +128,7 @@ impl Auxiliary {
         })
     }
 
-    /// Index among the parameters of error terms of an auxiliary parameter that is one.
+    /// Index, among the parameters of error terms, of an auxiliary parameter of this kind.
     pub(in crate::calibration) fn of_terms(index: usize) -> Option<usize> {
         index.checked_sub(TABLE_GEOMETRY)
     }

@@ -19,7 +19,7 @@ pub enum ErrorTerm {
 }
 
 impl ErrorTerm {
-    /// Every error term. If two explain a recording equally well, the first in this order is more common.
+    /// Every error term. If two terms explain a recording equally well, the first in this order is more common.
     pub const ALL: [Self; 5 + Term::ALL.len()] = {
         let mut all = [Self::GaussMarkovBias; 5 + Term::ALL.len()];
         (all[1], all[2]) = (Self::TableBase, Self::TableAxes(AxisError::Tilt));
@@ -39,7 +39,7 @@ impl ErrorTerm {
         all.filter(|&term| term != Self::GaussMarkovBias)
     }
 
-    /// The name that files and commands use.
+    /// The name used in files and commands.
     pub fn name(self) -> &'static str {
         match self {
             Self::GaussMarkovBias => "gauss-markov-bias",
@@ -51,8 +51,8 @@ impl ErrorTerm {
         }
     }
 
-    /// The term with whose effect its own is one where an axis is only up and down or turns at one rate: what is even in
-    /// force or rate. Apart, neither is absent or present.
+    /// The term with the same effect if an axis is only up and down or turns at one rate: both are even in force or
+    /// rate. Therefore the two are absent or present together.
     pub(in crate::calibration) fn alike(self) -> Self {
         Self::Instrument(match self {
             Self::Instrument(Term::AccelAsymmetry) => Term::AccelSecondOrder,
@@ -61,7 +61,7 @@ impl ErrorTerm {
         })
     }
 
-    /// Moves or dwells that show the term, where a path does not.
+    /// Moves or dwells that show the term, if a path does not.
     pub fn shown_by(self) -> &'static str {
         match self {
             Self::GaussMarkovBias => "a long dwell",

@@ -26,7 +26,7 @@ pub struct GroupEntry {
 }
 
 impl Group {
-    /// All six, in the order of the parameters.
+    /// All six groups, in the order of the parameters.
     pub fn all() -> impl Iterator<Item = Self> {
         Sensor::ALL
             .into_iter()
@@ -70,7 +70,7 @@ impl Group {
         }
     }
 
-    /// Such as `gyro scale factor K`.
+    /// Title, such as `gyro scale factor K`.
     pub fn title(self) -> String {
         format!("{} {}", self.sensor().name(), self.entry().title)
     }
@@ -80,7 +80,7 @@ impl Group {
         format!("{}, {}", self.title(), self.unit())
     }
 
-    /// Such as `gyro K`.
+    /// Short title, such as `gyro K`.
     pub fn short(self) -> String {
         let letter = self.entry().title.rsplit(' ').next().unwrap_or_default();
         format!("{} {letter}", self.sensor().name())

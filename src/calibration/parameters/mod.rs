@@ -19,7 +19,7 @@ pub type ParameterVector = SVector<f64, PARAMETERS>;
 /// A matrix of the parameters of both triads.
 pub type ParameterMatrix = SMatrix<f64, PARAMETERS, PARAMETERS>;
 
-/// Index of a parameter of a triad among the parameters of both.
+/// Index among the parameters of both triads of a parameter of one triad.
 pub fn parameter(sensor: Sensor, of_triad: usize) -> usize {
     match sensor {
         Sensor::Gyro => of_triad,
@@ -81,8 +81,8 @@ pub fn in_general_form(triads: &PerSensor<Triad>) -> PerSensor<Triad> {
     PerSensor::from_fn(|sensor| triads.get(sensor).in_form(InstallationForm::General))
 }
 
-/// Derivatives of a smooth function of unit scale, by central differences of sixth order; truncation and rounding
-/// errors are both about 1e-14.
+/// Derivatives of a smooth function with arguments of order one, by central differences of sixth order; truncation and
+/// rounding errors are both about 1e-14.
 pub fn derivatives<const M: usize, const N: usize>(
     at: &SVector<f64, N>,
     of: impl Fn(&SVector<f64, N>) -> SVector<f64, M>,

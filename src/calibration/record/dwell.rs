@@ -38,13 +38,14 @@ pub struct Rest {
 /// A step of a dwell.
 #[derive(Debug, Clone)]
 pub struct Standing {
-    /// When it ends, s.
+    /// End of the step, s.
     pub time: f64,
     /// Index of its model in the part.
     pub model: usize,
-    /// Change of the errors of attitude, velocity and position before it, because they refer to another computed state.
+    /// Change of the errors of attitude, velocity and position before the step, because they refer to another computed
+    /// state.
     pub referred: [Vector3<f64>; 3],
-    /// Indices of the observations at its end.
+    /// Indices of the observations at the end of the step.
     pub seen: Range<usize>,
 }
 
@@ -58,7 +59,7 @@ pub struct Seen {
     pub readings: usize,
 }
 
-/// Number of these steps, the first of which is in a dwell, that form a part of at most this many samples.
+/// Number of these steps that form a part of at most this many samples; the first step is in a dwell.
 pub fn part_of(steps: &[Step], longest: usize) -> usize {
     let end = steps.first().map_or(0, |step| step.samples.start + longest);
     let belongs = |step: &&Step| {
@@ -69,7 +70,7 @@ pub fn part_of(steps: &[Step], longest: usize) -> usize {
     1 + others.take_while(belongs).count()
 }
 
-/// Maximum number of samples of a part of a dwell with this first step.
+/// Maximum number of samples in a part of a dwell that begins with this step.
 pub fn longest(first: &Step) -> usize {
     STEPS * first.samples.len()
 }
@@ -93,7 +94,7 @@ impl Rest {
             .clone()
             .next()
             .and_then(|(_, at_rest)| at_rest.dwell.axes.clone());
-        // With the number of samples that each is for, and whether some of these are interpolated.
+        // Each model comes with its number of samples, and whether some of them are interpolated.
         let mut models: Vec<(usize, bool, Block)> = Vec::new();
         let (mut steps, mut seen) = (Vec::new(), Vec::new());
         for (step, at_rest) in part {
@@ -137,7 +138,7 @@ impl Rest {
         }
     }
 
-    /// When it ends, s.
+    /// End of the step, s.
     pub fn end(&self) -> f64 {
         self.steps.last().map_or(0.0, |step| step.time)
     }
@@ -167,8 +168,8 @@ impl Seen {
     }
 }
 
-/// Index of the model of a step with this many samples, some of which may be interpolated. If no other step is equal,
-/// the model is made: anew, or from one that differs only in interpolated samples.
+/// Index of the model of a step with this many samples, some of which may be interpolated. If no earlier step is equal,
+/// a new model is made, from scratch or from one that differs only in interpolated samples.
 fn model_of(
     models: &mut Vec<(usize, bool, Block)>,
     (length, bridged): (usize, bool),
@@ -189,9 +190,9 @@ pub fn samples_of(steps: &[Step]) -> Range<usize> {
     ends.map_or(0..0, |(first, last)| first.samples.start..last.samples.end)
 }
 
-/// Change of the errors of attitude, velocity and position when they are referred to another computed state of the same
-/// moment. It is of first order, like everything in a pass, so the filter stays linear and its result does not depend
-/// on the order of observations.
+/// Change of the errors of attitude, velocity and position if they are referred to another computed state at the same
+/// time. It is of first order, like everything in a pass, so the filter stays linear and its result does not depend on
+/// the order of observations.
 pub fn between(from: &State, to: &State) -> [Vector3<f64>; 3] {
     [
         to_tilt_and_heading(&(from.attitude * to.attitude.transpose())),

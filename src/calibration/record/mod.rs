@@ -1,4 +1,4 @@
-//! Events of a recording: navigation, which does not depend on noise.
+//! Events of a recording, from navigation; they do not depend on the noise.
 
 pub mod dwell;
 pub mod schedule;
@@ -40,7 +40,7 @@ pub fn events(
             continue;
         };
         if at_rest.first {
-            // The start holds what the first dwell says of table and position.
+            // The initial state already contains what the first dwell shows of table and position.
             (most, new_position) = (longest(step), next > 0);
             dwells += 1;
         }

@@ -38,7 +38,7 @@ pub struct AtRest {
 pub struct WholeDwell {
     /// Mean of the table's readings, `C_b_n`; `None` without a table.
     pub attitude: Option<Matrix3<f64>>,
-    /// Rotation of the table's attitude per error of its axes, if their angles are known.
+    /// Rotation of the table attitude per error of its axes, if their angles are known.
     pub axes: Option<Arc<AxisResponse>>,
     /// Mean output of the accelerometers.
     pub accel: Vector3<f64>,
@@ -46,8 +46,8 @@ pub struct WholeDwell {
 
 /// Length of a step, s: covariance is propagated and observations are taken at 10 Hz.
 const STEP: f64 = 0.1;
-/// Longest step of a packed recording, in such steps, after a dwell of equal length: by then, observations are limited
-/// by random walk, not by their own noise.
+/// Longest step of a packed recording, as a multiple of the usual step, after a dwell of equal length: by then,
+/// observations are limited by random walk, not by their own noise.
 const STEPS_OF_PACKED: usize = 10;
 
 /// The steps from the start of the first dwell to the end of the last, without a gap.
@@ -85,7 +85,7 @@ pub fn steps(run: &Run, table: Option<&TableLog>, dwells: &[Dwell]) -> Vec<Step>
             axes: axes.map(|angles| Arc::new(axis_response(angles))),
             accel: dwell.mean(Sensor::Accel, run).output,
         });
-        // The first reading of all is the initial attitude.
+        // The very first reading is the initial attitude.
         let first = usize::from(number == 0);
         let mut unread = readings.map(|(table, of)| (table, of.start + first..of.end));
         let of_steps = of_dwell(dwell).enumerate().map(|(number, samples)| {
@@ -112,7 +112,7 @@ pub fn steps(run: &Run, table: Option<&TableLog>, dwells: &[Dwell]) -> Vec<Step>
 }
 
 impl AtRest {
-    /// Linearisation point while the table is at rest: the attitude known from the pass before or else its mean reading;
+    /// Linearisation point while the table is at rest: the attitude from the previous pass, otherwise its mean reading;
     /// without a table the computed attitude, levelled.
     ///
     /// Both are within arc seconds of the truth in every pass, so the noise accumulated over a long

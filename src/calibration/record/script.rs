@@ -1,4 +1,5 @@
-//! Events of all stretches at one linearisation point: navigation runs once, whatever the noise is.
+//! Events of all stretches at one linearisation point: navigation runs only once, because it does not depend on the
+//! noise.
 
 use super::{Event, Rest, events};
 use crate::calibration::{AttitudePrior, CalibrationError, Linearisation, Problem};

@@ -12,11 +12,11 @@ pub const FLOOR: PerSensor<f64> = PerSensor {
     gyro: 1e-9,
     accel: 1e-7,
 };
-/// Least significant excess, in its standard errors.
+/// Smallest significant excess, in standard errors.
 const SIGNIFICANT: f64 = 3.0;
 
 /// White 1σ, at standstill, of the integral of each triad's output, in excess of random walk and pulses: attitude in
-/// rad, velocity in m/s. Stated in the run, or otherwise estimated from its dwells.
+/// rad, velocity in m/s. The values are stated in the run, otherwise estimated from its dwells.
 pub fn standstill_sigma(run: &Run, dwells: &[Dwell]) -> PerSensor<f64> {
     PerSensor::from_fn(|sensor| {
         let floor = *FLOOR.get(sensor);
@@ -25,8 +25,8 @@ pub fn standstill_sigma(run: &Run, dwells: &[Dwell]) -> PerSensor<f64> {
     })
 }
 
-/// Estimate from dwells: neighbouring increments share the attitude or velocity at their common border, so its
-/// variance is minus their covariance; random walk has no such covariance.
+/// Estimate from dwells. Neighbouring increments share the attitude or velocity at their common border, so the variance
+/// of this quantity is minus their covariance; random walk has no such covariance.
 fn shown(run: &Run, dwells: &[Dwell], sensor: Sensor) -> f64 {
     let imu = &run.recording.imu;
     let (samples, floor) = (imu.of(sensor), *FLOOR.get(sensor));
@@ -40,7 +40,7 @@ fn shown(run: &Run, dwells: &[Dwell], sensor: Sensor) -> f64 {
         let mean = sums.iter().sum::<Vector3<f64>>() / sums.len() as f64;
         for pair in sums.windows(2) {
             let square = (pair[0] - mean).norm_squared();
-            // A mean of the very sums takes that much off each product.
+            // Subtracting the mean of the same sums reduces each product by this amount.
             let by_mean = square / sums.len() as f64;
             covariance += (pair[0] - mean).dot(&(pair[1] - mean)) + by_mean;
             variance += square;
@@ -53,7 +53,8 @@ fn shown(run: &Run, dwells: &[Dwell], sensor: Sensor) -> f64 {
     let (covariance, variance) = (covariance / pairs as f64, variance / pairs as f64);
     let pulse = imu.pulse.get(sensor).powi(2) / 12.0;
     let excess = -covariance - pulse;
-    // At a constant rate the fractions left over may alternate, which is four times as much as at random.
+    // At a constant rate, the remaining fractions may alternate; their effect is then four times that of random
+    // fractions.
     let chance = SIGNIFICANT * variance / (pairs as f64).sqrt() + 3.0 * pulse;
     if excess > chance {
         excess.sqrt().max(floor)

@@ -15,7 +15,7 @@ use crate::imu::{
     Nominal, PerSensor, Sensor, ThermalModel, ThermalState, thermal_state_everywhere,
 };
 
-/// Converts triads that stay in the quantity of the file.
+/// Converts triads, which remain in the quantity of the file.
 const ONE: PerSensor<Nominal> = PerSensor {
     gyro: Nominal(Vector3::new(1.0, 1.0, 1.0)),
     accel: Nominal(Vector3::new(1.0, 1.0, 1.0)),
@@ -34,9 +34,9 @@ pub enum TemperatureError {
         sensor: Sensor,
         /// The temperature.
         found: f64,
-        /// Lowest of the range.
+        /// Lower end of the valid range.
         lowest: f64,
-        /// Highest of the range.
+        /// Upper end of the valid range.
         highest: f64,
     },
     /// A coefficient of an unknown parameter, or of an invalid order.
@@ -172,7 +172,7 @@ impl Calibration {
             }
         }
         Ok(Some(Thermal {
-            // What was known before is not in a record.
+            // A record does not contain prior knowledge.
             model: ThermalModel {
                 range: of.range,
                 sigma: PerSensor::default(),

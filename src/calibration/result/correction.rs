@@ -46,7 +46,7 @@ pub struct Calibrated {
 /// Largest ratio between scale factors of an instrument and their nominal values.
 const SCALE_FACTOR: f64 = 2.0;
 
-/// Axes whose volume is below this fraction of a cube do not span the space.
+/// Axes that enclose less than this fraction of the volume of a cube do not span the space.
 const SMALLEST_VOLUME: f64 = 1e-6;
 
 /// A term changes its own input by at most a hundredth, so three iterations leave a millionth.
@@ -187,7 +187,7 @@ impl Correction {
         let imu = &run.recording.imu;
         let plain = self.terms().next().is_none();
         let second = |k| ((imu.time(k) - imu.start()) / TEMPERATURE_SPACING) as u64;
-        // A calibration that changes with temperature is evaluated once per second, at the first sample in it.
+        // A calibration that changes with temperature is evaluated once per second, at the first sample of each second.
         let mut now: Option<(u64, Self, bool)> = None;
         let mut near = Near::new(imu);
         samples.map(move |k| {
@@ -242,8 +242,8 @@ impl Correction {
         self.changing.is_some()
     }
 
-    /// The same at the temperature of a run at a time in s, and whether it is valid there. Without a temperature, or if
-    /// a triad would be singular, the reference temperature is used.
+    /// The correction at the temperature of a run at a time in s, and whether it is valid there. Without a temperature,
+    /// or if a triad would be singular, the reference temperature is used.
     fn at(&self, run: &Run, time: f64) -> (Self, bool) {
         let temperature = run.recording.imu.temperature.as_ref();
         let known = self

@@ -33,8 +33,8 @@ pub const FORMAT_WITH_TEMPERATURE: &str = "turncal-calibration/2";
 pub const EQUATION: &str = "N = scale * (installation * u) + bias; u = correction * (N - bias)";
 
 /// The equation of a record with error terms of the instrument.
-pub const EQUATION_WITH_TERMS: &str = "N = scale * (installation * (u + t)) + bias; u = correction * (N - bias) - t; t: what terms add \
-     to u, zero in test_vectors";
+pub const EQUATION_WITH_TERMS: &str = "N = scale * (installation * (u + t)) + bias; u = correction * (N - bias) - t; \
+                                       t: contribution of the error terms to u, zero in test_vectors";
 
 /// A calibration with its accuracy and origin, or a known truth.
 ///
@@ -111,7 +111,7 @@ pub struct Calibration {
     /// Independent directions of the parameters, the least observed first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub observability: Vec<Direction>,
-    /// The noise that was used; `None` if a file states noise of another kind, as a truth may.
+    /// The noise that was used; `None` if a file states noise of another kind, as in some truth files.
     #[serde(
         default,
         deserialize_with = "if_known",
@@ -173,7 +173,7 @@ pub struct Provenance {
 /// A file that was read.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct InputFile {
-    /// Name, as run.toml spells it.
+    /// Name, as written in run.toml.
     pub name: String,
     /// SHA-256 in hexadecimal digits.
     pub sha256: String,
@@ -185,7 +185,7 @@ pub struct NoiseRecord {
     /// Policy, test and sources.
     #[serde(flatten)]
     pub report: NoiseReport,
-    /// The estimated noise as `[imu.noise]`, to be pasted into `run.toml`; `None` if it was not estimated.
+    /// The estimated noise as `[imu.noise]`, to be pasted into `run.toml`; `None` if the noise was not estimated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub run_toml: Option<String>,
 }
@@ -255,7 +255,7 @@ pub struct ConsistencyRecord {
     pub attitude: Option<NisRecord>,
 }
 
-/// Mean normalised innovation squared with its 95 % interval; one if σ are correct.
+/// Mean normalised innovation squared with its 95 % interval; one if the σ are correct.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct NisRecord {
     /// Mean per scalar observation.
@@ -301,7 +301,7 @@ impl Word {
 
 /// `calibration["gyro.bias.x"]`: a parameter by name, in the file's quantity, as [`Calibration::get`].
 ///
-/// # Panics Like a map, if there is no parameter with that name; `get` does not panic.
+/// # Panics If there is no parameter with that name, as with a map; `get` does not panic.
 impl Index<&str> for Calibration {
     type Output = f64;
 
@@ -314,7 +314,7 @@ impl Index<&str> for Calibration {
 }
 
 impl Calibration {
-    /// Whether its values must not be used.
+    /// Whether the values of the calibration must not be used.
     pub fn is_failed(&self) -> bool {
         let stated = self.verdict.as_ref().map(|verdict| verdict.word);
         let words = [stated, Some(Verdict::of(&self.findings).word)];

@@ -17,7 +17,7 @@ pub struct Nees {
     pub mean: f64,
     /// n: number of independent directions in which the covariance is not zero.
     pub count: usize,
-    /// 95 % interval of NEES/n if σ are correct (χ²).
+    /// 95 % interval of NEES/n if the σ are correct (χ²).
     pub interval: (f64, f64),
 }
 

@@ -173,7 +173,7 @@ impl Auxiliary {
 }
 
 impl Estimate {
-    /// The record of the usable values; unobserved parameters are stated with their values and σ before.
+    /// The record of the usable values; unobserved parameters are stated with their prior values and σ.
     fn usable_record(&self, before: Before<'_>, run: &Run, body_frame: BodyFrame) -> Calibration {
         let (mut sigma, nominal) = (self.sigma(), &run.instrument.nominal);
         for index in self.unobserved(before.sigma) {
@@ -254,7 +254,7 @@ pub fn correction_of(
 }
 
 impl TriadRecord {
-    /// σ of the parameters of both triads at their places in the records, by nominal scales.
+    /// σ of the parameters of both triads, arranged as in the records, by nominal scales.
     pub fn of_both_sigma(
         form: InstallationForm,
         sigma: &ParameterVector,
@@ -264,7 +264,7 @@ impl TriadRecord {
         PerSensor::from_fn(|sensor| Self::of_sigma(triads.get(sensor), nominal.get(sensor)))
     }
 
-    /// σ of a triad's parameters at their places in the record, by nominal scales.
+    /// σ of the parameters of a triad, arranged as in the record, by nominal scales.
     fn of_sigma(triad: &Triad, nominal: &Nominal) -> Self {
         let form = triad.form;
         let mut installation = [[0.0; 3]; 3];

@@ -39,7 +39,7 @@ pub struct ThermalRecord {
     /// Covariance of the calibration's `parameters` (rows) with the coefficients.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub cross: Vec<Vec<f64>>,
-    /// Coefficients of the powers of T − reference in K from the first on, by parameter.
+    /// Coefficients of the powers of T − reference in K, from the first power on, by parameter.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub powers: BTreeMap<String, Vec<f64>>,
 }
@@ -67,7 +67,7 @@ pub struct RecordingRecord {
     /// Mean temperature of its dwells, of all axes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature_degc: Option<f64>,
-    /// Parameters when calibrated alone, by name; empty if it gives no calibration alone.
+    /// Parameters when calibrated alone, by name; empty if the recording alone gives no calibration.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub alone: BTreeMap<String, ValueRecord>,
     /// Deviation of its parameters from the common ones; `mounting.x` and so on, in rad, is the rotation of the whole

@@ -26,9 +26,10 @@ use crate::imu::{
 use crate::recording::TEMPERATURE_SPACING;
 use crate::run::Run;
 
-/// Longest duration of a block, s: residuals of neighbouring seconds are alike, those of longer blocks hardly.
+/// Longest duration of a block, s: residuals of neighbouring seconds are correlated, residuals of longer blocks hardly
+/// are.
 const BLOCK: f64 = 100.0;
-/// Fewest blocks of a recording, if it is shorter.
+/// Minimum number of blocks, for a shorter recording.
 const FEWEST_BLOCKS: f64 = 30.0;
 
 /// Biases of an instrument at rest against temperature.
@@ -53,7 +54,7 @@ pub struct MeanAtRest {
     pub rate: f64,
     /// Output minus that at the reference, normalised, rad/s or m/s².
     pub change: f64,
-    /// Residual after the polynomial.
+    /// Residual from the polynomial.
     pub residual: f64,
 }
 
@@ -63,7 +64,7 @@ struct Block {
     temperature: PerSensor<[f64; 3]>,
     /// Rate, K/s.
     rate: PerSensor<[f64; 3]>,
-    /// Normalised.
+    /// Mean output of each axis, normalised.
     output: PerSensor<[f64; 3]>,
     /// Functions of temperature.
     state: ThermalState,
@@ -217,7 +218,7 @@ fn noise(rows: &DMatrix<f64>) -> Option<[f64; 6]> {
     sigma.iter().all(|sigma| *sigma > 0.0).then_some(sigma)
 }
 
-/// The blocks of each bias, with what the polynomial leaves.
+/// The blocks of each bias, with their residuals from the polynomial.
 fn means(blocks: &[Block], at: &Estimate, thermal: &Thermal) -> Vec<(usize, Vec<MeanAtRest>)> {
     let reference = at.vector();
     let of_axis = |(sensor, axis)| {
@@ -249,7 +250,7 @@ fn not_turned(model: &Model) -> impl Iterator<Item = Finding> {
         of.filter_map(|index| parameter_name(model.form, index))
             .collect()
     };
-    let by = "an instrument at rest in one attitude";
+    let by = "a recording at rest in one attitude";
     let hidden = names(&|sensor, is_bias| !is_bias || sensor == Sensor::Accel);
     let turned = names(&|_, is_bias| !is_bias);
     let findings = [not_observed(by, hidden), temperature_not_seen(turned)];
@@ -258,7 +259,7 @@ fn not_turned(model: &Model) -> impl Iterator<Item = Finding> {
 
 impl AtRest {
     /// The estimate with both triads, and its temperature dependence: biases of the gyros to within Earth rate, all
-    /// others from the prior, because the input hides them.
+    /// others from the prior, because they cannot be separated from the input.
     pub fn biases(&self, problem: &Problem) -> (Estimate, Thermal) {
         let model = &problem.model;
         let variances = model.prior_sigma.map(|sigma| sigma.powi(2));

@@ -32,7 +32,7 @@ pub struct DayToDay {
 /// Deviation of one recording from the common parameters, or its 1σ.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Difference {
-    /// Added to each parameter, normalised.
+    /// Deviation added to each parameter, normalised.
     pub parameters: ParameterVector,
     /// Rotation vector ψ of the whole instrument on its mounting face, body axes, rad: for the input u of the face, the
     /// instrument senses `R(ψ)ᵀ u`.
@@ -50,11 +50,11 @@ pub enum OwnState {
 
 /// The key of the mounting in a campaign's `[day_to_day]`.
 const MOUNTING: &str = "mounting_arcsec";
-/// Iterations that determine a mounting of a degree to a thousandth of a second of arc.
+/// Number of iterations that determine a mounting of one degree to a thousandth of a second of arc.
 const ROUNDS: usize = 3;
 
 impl DayToDay {
-    /// Whether anything differs.
+    /// Whether any quantity differs.
     pub fn any(&self) -> bool {
         self.parameters.amax() > 0.0 || self.mounting > 0.0
     }
@@ -105,7 +105,7 @@ impl DayToDay {
         }
     }
 
-    /// Covariance of the parameters of a recording around the common ones.
+    /// Covariance of the parameters of a recording about the common ones.
     pub(in crate::calibration) fn covariance(&self, common: &PerSensor<Triad>) -> ParameterMatrix {
         let parameters = self.parameters.component_mul(&self.parameters);
         let parameters = ParameterMatrix::from_diagonal(&parameters);

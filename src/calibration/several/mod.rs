@@ -2,7 +2,8 @@
 //! recordings have a stated σ, and parameters may depend on temperature.
 //!
 //! Each recording is first calibrated alone, on its own thread. Polynomials through these estimates are the start of
-//! the iterations on all data, with all orders that the temperatures support; each is averaged over being absent.
+//! the iterations on all data, with all orders that the temperatures support; the result is averaged over the presence
+//! and absence of each order.
 
 pub mod at_rest;
 pub mod day_to_day;
@@ -43,11 +44,12 @@ impl Default for Together {
 }
 
 impl<'a> Problem<'a> {
-    /// The joint problem of several recordings of one instrument. The instrument and table of the first apply to all;
-    /// a recording without a dwell is dropped with a finding.
+    /// The joint problem of several recordings of one instrument. The instrument and table of the first apply to all; a
+    /// recording without a dwell is excluded with a finding.
     ///
     /// # Errors
-    /// [`CalibrationError`] if there is no recording, or if one has no temperature although parameters depend on it.
+    /// [`CalibrationError`] if there is no recording, or if a recording has no temperature although parameters depend
+    /// on temperature.
     pub fn together(
         runs: &[&'a Run],
         options: &Options,
@@ -76,7 +78,7 @@ impl<'a> Problem<'a> {
     }
 }
 
-/// Where the iterations of a problem begin.
+/// Starting point of the iterations of a problem.
 pub struct Start {
     pub at: Linearisation,
     /// Prior of the initial attitude of each stretch.

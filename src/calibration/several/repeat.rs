@@ -17,7 +17,7 @@ pub struct Repeatability {
     pub sigma: f64,
     /// Standard deviation expected from the stated σ of the calibrations.
     pub claimed: f64,
-    /// χ² of the deviations per degree of freedom; one if σ are correct.
+    /// χ² of the deviations per degree of freedom; one if the σ are correct.
     pub chi_square: f64,
     /// Limit at a false-alarm rate of 0.1 %.
     pub limit: f64,
@@ -59,11 +59,11 @@ impl Outcome {
             None => self.estimate.covariance,
         };
         let own = &self.model.day_to_day;
-        // All together have told the mounting already.
+        // The mounting was already determined by all recordings together.
         let told = if own.mounting > 0.0 { 3 } else { 0 };
         let own = own.covariance(&self.estimate.triads);
-        // What one part of the data says differs from what all say by as much as it knows less (Hausman 1978,
-        // "Specification tests in econometrics", Econometrica 46(6)).
+        // The estimate from part of the data differs from that of all data by as much as its covariance is larger
+        // (Hausman 1978, "Specification tests in econometrics", Econometrica 46(6)).
         let covariance = DMatrix::from_fn(n, n, |i, j| {
             let (i, j) = (estimated[i], estimated[j]);
             (estimate.covariance[(i, j)] + own[(i, j)] - together[(i, j)]) / (sigma[i] * sigma[j])

@@ -20,7 +20,7 @@ use crate::run::Dwell;
 /// larger.
 const BEYOND_NOISE: f64 = 10.0;
 
-/// A recording that spans less than this part of the range counts as one temperature.
+/// A recording that spans less than this fraction of the range counts as one temperature.
 const PART_OF_RANGE: f64 = 0.1;
 
 /// A recording calibrated alone.
@@ -78,7 +78,7 @@ fn alone(
     let middle = middle_temperature(plain);
     let state = thermal.zip(middle.as_ref());
     let state = state.map(|(thermal, at)| thermal_state(&thermal.range, at, &PerSensor::default()));
-    // What changes within a recording has no calibration without its change.
+    // A recording with changing temperature cannot be calibrated without the temperature dependence.
     let whole = thermal.map_or(f64::INFINITY, |thermal| {
         let span = |range: &ThermalRange| range.highest - range.lowest;
         span(&thermal.range.gyro).max(span(&thermal.range.accel))
@@ -148,7 +148,7 @@ pub fn through(
     for alone in alone {
         let known = alone.estimate.as_ref();
         let variance = known.map_or(0.0, |estimate| estimate.covariance[(index, index)]);
-        // Without a σ the coarse start is as good as a tenth of what was known before.
+        // Without a σ, the coarse start is assumed to be accurate to a tenth of the prior σ.
         let variance = if variance > 0.0 {
             variance * BEYOND_NOISE.powi(2) + own
         } else {
@@ -163,7 +163,7 @@ pub fn through(
         normal.ger(1.0 / variance, &row, &row, 1.0);
         right.axpy(off / variance, &row, 1.0);
     }
-    // Positive definite by the prior.
+    // The matrix is positive definite because of the prior.
     let solution = normal.cholesky().map(|factor| factor.solve(&right));
     solution.map_or_else(
         || DVector::zeros(n),

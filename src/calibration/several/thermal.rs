@@ -50,7 +50,7 @@ impl Coefficient {
         state.get(self.sensor)[self.axis][self.function]
     }
 
-    /// Value among these coefficients.
+    /// Value of the coefficient among these coefficients.
     pub(in crate::calibration) fn of(&self, all: &PerSensor<ThermalCoefficients>) -> f64 {
         all.get(self.sensor)[(self.parameter, self.function)]
     }
@@ -79,7 +79,7 @@ pub struct Thermal {
 }
 
 impl Thermal {
-    /// The coefficients of both triads; zero where off.
+    /// The coefficients of both triads; zero if off.
     pub fn coefficients(&self) -> PerSensor<ThermalCoefficients> {
         let mut all = PerSensor::<ThermalCoefficients>::default();
         for (coefficient, value) in self.coefficients.iter().zip(&self.values) {

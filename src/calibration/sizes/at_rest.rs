@@ -23,14 +23,14 @@ const RATE: f64 = 1e-3;
 const FORCE: f64 = 0.03;
 /// Degrees of freedom of the prior of a dwell's variance relative to all dwells.
 const BEFOREHAND: f64 = 6.0;
-/// Least logarithm of a size over the usual one: a noise a hundred times smaller is that of rounding.
+/// Smallest log of a size over the usual one: noise a hundred times smaller than usual is only rounding.
 const LEAST: f64 = -4.605_170_185_988_091;
 
 /// The noise at rest.
 pub struct NoiseAtRest {
     /// Logarithms of the common sizes over the usual ones.
     pub logs: DVector<f64>,
-    /// 1σ of each.
+    /// 1σ of each logarithm.
     pub sigma: DVector<f64>,
     pub dispersion: Dispersion,
 }
@@ -38,7 +38,7 @@ pub struct NoiseAtRest {
 /// Residuals of the parts of a dwell if all quantities given to them are free.
 #[derive(Debug, Clone, Copy, Default)]
 struct Left {
-    /// Logarithm of the determinant of the covariance.
+    /// Log-determinant of the covariance.
     log_determinant: f64,
     /// Sum of squares over the variances common to all dwells.
     squares: f64,
@@ -69,13 +69,13 @@ struct Changes {
 /// The scalars of a part.
 #[derive(Default, Clone)]
 struct Seen {
-    /// Whitened scalars minus the part explained by the given quantities, each with the logarithm of its σ.
+    /// Whitened scalars minus the part explained by the given quantities, each with its log σ.
     scalars: Vec<(f64, f64)>,
     /// Rows of the scalars with respect to the given quantities, one after the other.
     rows: Vec<f64>,
 }
 
-/// Dwells whose noise is sought.
+/// Dwells whose noise is estimated.
 struct Dwells<'a> {
     problem: &'a Problem<'a>,
     script: &'a Script,
@@ -130,8 +130,8 @@ impl Dwells<'_> {
         model
     }
 
-    /// The likeliest sizes common to all dwells, whatever the factor of each is, by Fisher's scoring with differences
-    /// (Gupta and Mehra 1974, IEEE Trans. Automatic Control 19(6)).
+    /// The most likely sizes common to all dwells, for any factor of each dwell, by Fisher scoring with finite
+    /// differences (Gupta and Mehra 1974, IEEE Trans. Automatic Control 19(6)).
     fn common(&mut self, dispersion: &Dispersion, start: DVector<f64>) -> Lowest {
         let n = self.usual.len();
         let of_prior = |k: usize| self.usual[k].spread.powi(-2);
@@ -173,7 +173,7 @@ impl Seen {
 }
 
 impl AllLeft {
-    /// Fisher's information on the changes, whatever the factor of each dwell's variance is.
+    /// Fisher information on the changes, for any factor of the variance of each dwell.
     fn information(&self) -> DMatrix<f64> {
         let n = self.dwells.len() - 1;
         let each = self.changes.iter().zip(&self.dwells[0]);
@@ -194,7 +194,7 @@ impl Changes {
         }
     }
 
-    /// Adds a part, as seen with all models.
+    /// Adds the residuals of a part with all models.
     fn add(&mut self, seen: &[Seen]) {
         let Some((here, others)) = seen.split_first() else {
             return;
@@ -203,7 +203,7 @@ impl Changes {
         for (k, here) in here.scalars.iter().enumerate() {
             let changes = others.iter().map(|of| {
                 let log = of.scalars[k].1 - here.1;
-                // The whitened observation changes by its σ too.
+                // The whitened observation also changes with its σ.
                 (log, of.scalars[k].0 - here.0 + log * here.0)
             });
             let (logs, scalars): (Vec<_>, Vec<_>) = changes.unzip();
@@ -216,7 +216,7 @@ impl Changes {
 }
 
 impl Left {
-    /// Adds a part; returns what it is given, as its rows say.
+    /// Adds a part; returns its given quantities, as estimated from its rows.
     fn add(&mut self, part: &Part, factor: f64) -> Option<DVector<f64>> {
         let given = part.measured.ncols();
         let wide = |k: usize| match given - k {
@@ -234,7 +234,7 @@ impl Left {
         let squares = part.squares + part.values.norm_squared() - told.norm_squared();
         self.squares += factor * squares;
         self.log_determinant += part.log_determinant + determinant;
-        // What the part tells of what it is given.
+        // Information of the part on its given quantities.
         let inverse = root.inverse();
         let told = (0..given).map(|k| 1.0 - wide(k).powi(-2) * inverse[(k, k)]);
         self.freedom += part.count as f64 - told.sum::<f64>();
@@ -246,13 +246,13 @@ impl Left {
         (BEFOREHAND + self.freedom) * (self.squares / BEFOREHAND).ln_1p() + self.log_determinant
     }
 
-    /// The factor of the variance that the dwell shows.
+    /// The variance factor of the dwell, estimated from its residuals.
     fn factor(&self) -> f64 {
         (BEFOREHAND + self.squares) / (BEFOREHAND + self.freedom)
     }
 }
 
-/// The likeliest noise at rest in the median dwell, each size with its prior; starts from the noise at an earlier
+/// The most likely noise at rest in the median dwell, each size with its prior; starts from the noise at an earlier
 /// linearisation point, if any.
 pub fn likeliest(
     problem: &Problem,

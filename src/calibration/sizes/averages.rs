@@ -1,16 +1,16 @@
 //! Average over effects that may be absent and whose size is not known: error terms, temperature orders.
 //!
 //! A group of constants is absent with probability one half; otherwise it has its usual size, known to a factor of
-//! three. The posterior of all constants is the average over these cases. With many groups the average is found as in
-//! expectation propagation (Minka 2001, "Expectation propagation for approximate Bayesian inference", UAI 17): the
-//! prior of each group becomes the normal one about zero with which its mean is that of the average over its own cases,
-//! given the priors of all others. The covariance then is that within the cases, to which that between them is added.
+//! three. The posterior of all constants is the average over these cases. With many groups, the average is found as in
+//! expectation propagation (Minka 2001, "Expectation propagation for approximate Bayesian inference", UAI 17): each
+//! group gets the normal prior about zero for which its mean equals that of the average over its own cases, given the
+//! priors of all others. The covariance is then that within the cases plus that between the cases.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use crate::calibration::constants::{Information, inverse};
 
-/// Sizes over the usual one: every half power of three to the factor 3^(3/2), with weights of a triangle over their
+/// Sizes over the usual one: every half power of three up to the factor 3^(3/2), with triangular weights over their
 /// logarithms.
 const SIZES: [(f64, f64); 7] = [
     (0.192_450_089_729_875_26, 1.0 / 16.0),
@@ -23,21 +23,22 @@ const SIZES: [(f64, f64); 7] = [
 ];
 /// The largest size over the usual one.
 pub const LARGEST: f64 = SIZES[6].0;
-/// Least variance of a prior: what is absent is so to a millionth of its usual size.
+/// Smallest variance of a prior: an absent constant is zero to a millionth of its usual size.
 const NOTHING: f64 = 1e-12;
 /// Prior probability that a group is absent.
 const ABSENT: f64 = 0.5;
-/// Most rounds over all groups.
+/// Maximum number of rounds over all groups.
 const ROUNDS: usize = 100;
-/// A change of the probability that any group is absent by less than this has settled.
+/// The average has settled if no probability of absence changes by more than this.
 const SETTLED: f64 = 1e-5;
 
 /// The average over all cases of groups of constants, in units of their usual sizes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Average {
-    /// Inverse of the covariance of the normal prior of each group, block by block.
+    /// Inverse covariance of each group's normal prior, block by block.
     pub precision: DMatrix<f64>,
-    /// Covariance between the cases of each group, from both sides multiplied by the inverse of that within them.
+    /// Covariance between the cases of each group, multiplied from both sides by the inverse covariance within the
+    /// cases.
     pub between: DMatrix<f64>,
     /// Probability that each group is absent.
     pub absent: Vec<f64>,
@@ -66,8 +67,8 @@ impl Average {
         }
     }
 
-    /// The average given the data's information on all groups, each with its places among the constants, starting from
-    /// this average; `None` if the covariance of a group is not positive definite.
+    /// The average, given the information of the data on all groups, each with its positions among the constants,
+    /// starting from this average; `None` if the covariance of a group is not positive definite.
     pub fn given(mut self, data: &Information, groups: &[Vec<usize>]) -> Option<Self> {
         for _ in 0..ROUNDS {
             let mut now = self.moments(data)?;
@@ -98,7 +99,7 @@ impl Average {
         })
     }
 
-    /// Information of all other groups on a group.
+    /// Information on a group from the data and all other groups.
     fn others(&self, places: &[usize], now: &Moments) -> Option<Information> {
         let inverse = Cholesky::new(of(&now.covariance, places))?.inverse();
         Some(Information {
@@ -135,7 +136,7 @@ impl Moments {
     }
 }
 
-/// The cases of a group, given what all others say.
+/// The cases of a group, given the information from all others.
 struct Cases {
     /// Probability that the group is absent.
     absent: f64,
@@ -147,7 +148,7 @@ struct Cases {
 impl Cases {
     fn of(others: &Information) -> Self {
         let n = others.vector.len();
-        // Along the directions that the others determine independently.
+        // Computed along the directions that the others determine independently.
         let turned = others.matrix.clone().symmetric_eigen();
         let said = turned.eigenvectors.tr_mul(&others.vector);
         let known = turned.eigenvalues.map(|value| value.max(0.0));
@@ -175,7 +176,8 @@ impl Cases {
             open.axpy(weight * size.powi(-2), variance, 1.0);
         }
         within.axpy(NOTHING, &open, 1.0);
-        // The mean of a case is its variance times what the others say; so the mean of all is that of the mean variance.
+        // The mean of a case is its variance times the information vector of the others, so the overall mean follows
+        // from the mean variance.
         let mut between = DMatrix::zeros(n, n);
         for (weight, variance) in weights.iter().zip(&variances) {
             let off = (variance - &within)

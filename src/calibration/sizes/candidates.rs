@@ -6,20 +6,20 @@ use super::averages::Average;
 use crate::calibration::constants::{Information, Sites};
 use crate::calibration::{Candidate, Constant, Known, Model, Prior};
 
-/// Size over the usual one with which a term begins.
+/// Initial size of a term over its usual size.
 const NEXT_TO_ABSENT: f64 = 0.01;
 
 /// Constants that may be absent, in groups, with the average over their cases.
 #[derive(Debug, Clone)]
 pub struct Candidates {
     all: Vec<Candidate>,
-    /// Places of the constants of each candidate among the constants that may be absent.
+    /// Positions of the constants of each candidate among the constants that may be absent.
     places: Vec<Vec<usize>>,
     average: Average,
 }
 
 impl Candidates {
-    /// The candidates among constants, not yet weighed.
+    /// The candidates among constants, before averaging.
     pub fn new(constants: &[Constant], model: &Model) -> Self {
         let mut all = Vec::new();
         let mut places = Vec::<Vec<usize>>::new();
@@ -46,7 +46,7 @@ impl Candidates {
         self.all.iter().copied().zip(absent)
     }
 
-    /// The candidates with the places of their constants among those that may be absent.
+    /// The candidates with the positions of their constants among those that may be absent.
     pub fn places(&self) -> impl Iterator<Item = (Candidate, &[usize])> {
         self.all
             .iter()
@@ -54,7 +54,7 @@ impl Candidates {
             .zip(self.places.iter().map(Vec::as_slice))
     }
 
-    /// Normal priors that stand for the average, of errors of the linearisation point of this prior.
+    /// Normal priors that represent the average, for errors of the linearisation point of this prior.
     pub fn sites(&self, prior: &Prior) -> Sites {
         let (usual, at) = usual_and_values(prior);
         let inverse = DMatrix::from_diagonal(&usual.map(f64::recip));
@@ -68,7 +68,7 @@ impl Candidates {
         }
     }
 
-    /// Begins the average anew.
+    /// Restarts the average.
     pub fn begin(&mut self) {
         self.average = begun(&self.all, &self.places);
     }
@@ -98,8 +98,8 @@ impl Candidates {
     }
 }
 
-/// Begins terms next to absent, because all of them together could explain everything else; orders of temperature with
-/// their usual sizes, because nothing else explains what warms.
+/// Starts terms almost absent, because all of them together could explain everything else, and orders of temperature
+/// with their usual sizes, because nothing else explains the effect of warming.
 fn begun(all: &[Candidate], places: &[Vec<usize>]) -> Average {
     let size = |of: &Candidate| match of {
         Candidate::Order(..) => 1.0,

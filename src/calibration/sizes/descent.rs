@@ -4,11 +4,11 @@ use nalgebra::{DMatrix, DVector};
 
 /// Longest step of a logarithm: a factor e.
 const LONGEST: f64 = 1.0;
-/// A step is given up if it does not lower the cost at this fraction.
+/// A step is abandoned if it does not lower the cost even at this fraction.
 const SHORTEST: f64 = 0.05;
-/// A fall of −2 ln of a density that is expected to be below this ends the descent: a seventh of a σ.
+/// The descent ends if the expected decrease of −2 ln of a density is below this: a seventh of a σ.
 const SETTLED: f64 = 0.02;
-/// Most steps.
+/// Maximum number of steps.
 const STEPS: usize = 30;
 
 /// A cost with its gradient.
@@ -47,20 +47,20 @@ pub struct Lowest {
 }
 
 impl Lowest {
-    /// 1σ of each logarithm, the cost being −2 ln of a density.
+    /// 1σ of each logarithm, if the cost is −2 ln of a density.
     pub fn sigma(&self) -> DVector<f64> {
         self.inverse.diagonal().map(|of| (2.0 * of.max(0.0)).sqrt())
     }
 }
 
-/// The lowest point found from a start, by Newton's steps with the expected curvature (Fisher's scoring).
+/// The lowest point found from a start, by Newton steps with the expected curvature (Fisher scoring).
 pub fn descend<E>(
     start: DVector<f64>,
     mut slope_at: impl FnMut(&DVector<f64>) -> Result<Slope, E>,
 ) -> Result<Lowest, E> {
     let mut at = start;
     let mut here = slope_at(&at)?;
-    // What is met may bend more than is expected: then a whole step goes too far, to and fro.
+    // The actual curvature may be larger than expected; full steps then overshoot and oscillate.
     let mut bend = 1.0f64;
     for _ in 0..STEPS {
         let mut step = here.inverse() * &here.gradient / -bend;

@@ -11,11 +11,11 @@ use crate::calibration::{CalibrationError, Known, Posterior, Prior};
 
 /// Degrees of freedom of the distribution of single events (Student's t).
 pub const FREEDOM: f64 = 6.0;
-/// Most steps.
+/// Maximum number of steps.
 const STEPS: usize = 40;
-/// A step is given up if it does not lower the cost at this fraction.
+/// A step is abandoned if it does not lower the cost even at this fraction.
 const SHORTEST: f64 = 0.05;
-/// A fall of −2 ln of the density by less than this ends the descent.
+/// The descent ends if −2 ln of the density decreases by less than this.
 const SETTLED: f64 = 0.05;
 /// Longest step of the logarithm of a σ.
 const LONGEST: f64 = 1.0;
@@ -23,9 +23,9 @@ const LONGEST: f64 = 1.0;
 /// Sizes of effects and of single events.
 #[derive(Debug, Clone)]
 pub struct At {
-    /// Logarithms of σ over the usual ones, with which the links were made.
+    /// Logs of σ over the usual σ with which the links were made.
     pub logs: DVector<f64>,
-    /// Variances of events over those of their effects.
+    /// Variances of events, divided by those of their effects.
     pub events: Sizes,
 }
 
@@ -39,16 +39,16 @@ pub struct Here<'a> {
     cost: f64,
 }
 
-/// A chain whose sizes are sought.
+/// A chain whose sizes are estimated.
 pub struct Search<'a> {
     pub chain: &'a Chain,
     pub prior: &'a Prior,
-    /// Effects whose sizes are sought, with the usual ones; the links were made with these.
+    /// Effects whose sizes are estimated, with the usual sizes with which the links were made.
     pub usual: &'a [Usual],
 }
 
 impl<'a> Search<'a> {
-    /// Variances over those with which the links were made.
+    /// Variances, divided by those with which the links were made.
     pub fn sizes(&self, at: &At) -> Sizes {
         let pairs = self.usual.iter().zip(&at.logs);
         pairs.fold(at.events.clone(), |sizes, (of, by)| match of.effect() {
@@ -69,7 +69,7 @@ impl<'a> Search<'a> {
             .ok_or(undetermined)?;
         let of_logs = self.usual.iter().zip(&at.logs);
         let of_logs: f64 = of_logs.map(|(of, by)| (by / of.spread).powi(2)).sum();
-        // That of an inverse gamma distribution of the variance, whose normal draws are Student's.
+        // The prior term of an inverse-gamma distribution of the variance; normal draws then follow Student's t.
         let of_events: f64 = at
             .events
             .events()
@@ -84,12 +84,12 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// The likeliest sizes from a start, with these sites of the constants that may be absent.
+    /// The most likely sizes from a start, with these sites of the constants that may be absent.
     ///
-    /// One forward and one backward pass give the cost, the gradient and the likeliest variance of each event (Koopman
-    /// and Shephard 1992). An event of an effect with heavy tails has a variance of its own, so that one that is larger
-    /// than the others stands out instead of widening all (Lange, Little, Taylor 1989, J. Am. Stat. Assoc. 84(408)).
-    /// Each step lowers the cost.
+    /// One forward and one backward pass give the cost, the gradient and the most likely variance of each event
+    /// (Koopman and Shephard 1992). Each event of an effect with heavy tails has its own variance, so that an event
+    /// larger than the others stands out instead of increasing the σ of all (Lange, Little, Taylor 1989, J. Am. Stat.
+    /// Assoc. 84(408)). Each step lowers the cost.
     ///
     /// # Errors
     /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
@@ -115,7 +115,7 @@ impl<'a> Search<'a> {
         Ok(here)
     }
 
-    /// A step of Fisher's scoring for the sizes of effects, and what each event says of its own.
+    /// A step of Fisher scoring for the sizes of effects, and the variance factor of each event.
     fn next(&self, here: &Here) -> At {
         let smoothed = here.smoothed();
         let by_effect = smoothed.by_effect();
@@ -132,7 +132,7 @@ impl<'a> Search<'a> {
         let mut events = at.events.of_events_alone();
         for (&(effect, event), moments) in &smoothed.0 {
             if effect.has_heavy_tails() {
-                // What the data do not tell of an event says nothing of its size.
+                // The part of an event that the data do not determine gives no information on its size.
                 let squares = moments.squares * at.events.of_event(effect, event);
                 let known = moments.count - moments.unknown;
                 let factor = (FREEDOM + squares) / (FREEDOM + known);
@@ -149,7 +149,7 @@ impl Here<'_> {
         self.filtered.smoothed(&self.posterior)
     }
 
-    /// 1σ of the logarithm of the size of each effect.
+    /// 1σ of the log size of each effect.
     pub fn sigma(&self, usual: &[Usual]) -> DVector<f64> {
         let by_effect = self.smoothed().by_effect();
         DVector::from_iterator(
@@ -164,9 +164,9 @@ impl Here<'_> {
 }
 
 impl At {
-    /// The usual sizes, with slips as wide as positions: a slip that explains as much as all later positions is tried
-    /// before them, and shrinks if not needed (graduated non-convexity: Blake and Zisserman, *Visual Reconstruction*,
-    /// ch. 7).
+    /// The usual sizes, with slips as large as position errors: a slip that explains as much as all later positions is
+    /// tried first, and shrinks if it is not needed (graduated non-convexity: Blake and Zisserman, *Visual
+    /// Reconstruction*, ch. 7).
     pub fn usual(usual: &[Usual], chain: &Chain) -> Self {
         let drives = chain.links.iter().flat_map(|link| &link.transition.drives);
         let slips = drives.filter(|drive| matches!(drive.effect, Effect::Slip(_)));

@@ -26,29 +26,28 @@ pub use usual::LOG_SIGMA;
 pub use usual::Usual;
 use usual::What;
 
-/// Most rounds of sizes and averages at one linearisation point, when the first is near.
+/// Maximum number of rounds of sizes and averages at one linearisation point, the first time it is near.
 const ROUNDS: usize = 4;
-/// A change of the logarithm of every size, in its σ, or of the probability that something is absent, by less than this
-/// has settled.
+/// Sizes and averages have settled if no log size (in its σ) and no probability of absence changes by more than this.
 const SETTLED: f64 = 0.1;
 
-/// A size as estimated.
+/// An estimated size.
 #[derive(Debug, Clone, Copy)]
 struct Size {
     usual: Usual,
-    /// Logarithm over the usual size, and its 1σ.
+    /// Log of the size over the usual size, and its 1σ.
     log: f64,
     sigma: f64,
 }
 
-/// How far a linearisation point is from the estimate.
+/// Distance of a linearisation point from the estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stage {
     /// Errors of the linearisation dominate the residuals.
     Far,
     /// Near for the first time.
     FirstNear,
-    /// Near as before.
+    /// Near, as in the previous pass.
     Near,
 }
 
@@ -58,7 +57,7 @@ pub struct Effects {
     at_rest: Vec<Size>,
     between: Vec<Size>,
     pub dispersion: Dispersion,
-    /// Variances of single events over those of their effects.
+    /// Variances of single events, divided by those of their effects.
     events: Sizes,
     pub candidates: Candidates,
     pub are_settled: bool,
@@ -86,7 +85,7 @@ impl Effects {
         }
     }
 
-    /// Makes the sizes likelier at a linearisation point, in several rounds once it is near.
+    /// Improves the sizes at a linearisation point, in several rounds once the point is near.
     ///
     /// # Errors
     /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
@@ -97,7 +96,7 @@ impl Effects {
         stage: Stage,
     ) -> Result<(), CalibrationError> {
         let is_stated = problem.options.noise == NoisePolicy::Stated;
-        // What dwells alone say hardly depends on the linearisation.
+        // The noise found from the dwells alone hardly depends on the linearisation.
         if !is_stated && (self.at_rest.is_empty() || stage == Stage::FirstNear) {
             self.improve_at_rest(problem, script);
         }
@@ -124,7 +123,8 @@ impl Effects {
         Ok(())
     }
 
-    /// Begins all that was sought far from the estimate anew, where the misfit was that of the linearisation.
+    /// Restarts everything that was estimated far from the estimate, because there the misfit was due to the
+    /// linearisation.
     fn begin(&mut self) {
         self.events = Sizes::default();
         self.between.iter_mut().for_each(|size| size.log = 0.0);
@@ -158,7 +158,7 @@ impl Effects {
             .collect();
     }
 
-    /// The sizes between dwells and the averages over what may be absent; returns the largest change.
+    /// Updates the sizes between dwells and the averages over effects that may be absent; returns the largest change.
     fn improve_between(&mut self, chain: &Chain, prior: &Prior) -> Result<f64, CalibrationError> {
         let usual: Vec<Usual> = self.between.iter().map(|size| size.usual).collect();
         let search = Search {
@@ -178,7 +178,7 @@ impl Effects {
         for (k, size) in self.between.iter_mut().enumerate() {
             (size.log, size.sigma) = (here.at.logs[k], sigma[k]);
         }
-        // What the data hardly tell may wander.
+        // Sizes that the data hardly determine may wander.
         let moved = (&here.at.logs - before).component_div(&sigma);
         let of_sizes = moved.iter().map(|by| by.abs()).fold(0.0, f64::max);
         self.events = here.at.events;
@@ -233,7 +233,7 @@ impl Effects {
         })
     }
 
-    /// As [`Self::weighed`] for some of the rows; the candidates are averaged again.
+    /// Does the same as [`Self::weighed`] for some of the rows; the candidates are averaged again.
     ///
     /// # Errors
     /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
@@ -250,7 +250,7 @@ impl Effects {
         anew.weighed(chain, problem, script)
     }
 
-    /// Variances over those with which the links of a chain are made; as stated, nothing slips.
+    /// Variances, divided by those with which the links of a chain are made; with stated noise, there are no slips.
     pub fn sizes(&self, chain: &Chain) -> Sizes {
         if self.at_rest.is_empty() && self.between.is_empty() {
             let slips = chain.states.slips.is_some();
@@ -268,7 +268,7 @@ impl Effects {
         })
     }
 
-    /// Sets the noise at rest in a model, and all other effects at a logarithm over their usual sizes.
+    /// Sets the noise at rest in a model, and all other effects to these logs over their usual sizes.
     fn set(&self, model: &mut Model, log: impl Fn(&Size) -> f64) {
         self.at_rest
             .iter()

@@ -7,16 +7,16 @@ use crate::calibration::record::script::Moves;
 use crate::calibration::{Group, Model, Problem, Source};
 use crate::run::Aiding;
 
-/// Prior 1σ of ln σ of a stated figure: a factor of three.
+/// Prior 1σ of the log σ of a stated figure: a factor of three.
 pub const LOG_SIGMA: f64 = 1.098_612_288_668_109_8;
-/// Prior 1σ of ln σ of a figure that is not stated, around the effect of white noise: a factor of ten.
+/// Prior 1σ of the log σ of an unstated figure, about the effect of white noise: a factor of ten.
 const LOG_SIGMA_NOT_STATED: f64 = std::f64::consts::LN_10;
-/// Correlation time of a bias without a stated one, s.
+/// Default correlation time of a bias, s.
 const CORRELATION_TIME: f64 = 100.0;
-/// Usual differences between recordings over the prior σ of an instrument.
+/// Usual differences between recordings, divided by the prior σ of an instrument.
 const DIFFERENCE: f64 = 0.1;
 
-/// A quantity with a size.
+/// A quantity whose size is estimated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum What {
     /// A source of noise.
@@ -41,7 +41,7 @@ pub struct Usual {
 
 impl Usual {
     /// The usual sizes of every source that a problem can have, and of the differences between its recordings; `moves`
-    /// scale the noise of moves.
+    /// scales the noise of moves.
     pub fn all(problem: &Problem, moves: &Moves) -> Vec<Self> {
         let sources = Source::ALL.into_iter();
         let sources = sources.filter_map(|source| Self::of(source, problem, moves));
@@ -132,7 +132,7 @@ impl Usual {
     }
 }
 
-/// 1σ of the stated differences of a group over the prior σ.
+/// 1σ of the stated differences of a group, divided by the prior σ.
 fn stated_difference(group: Group, model: &Model) -> Option<f64> {
     let of = |index: usize| model.day_to_day.parameters[index] / model.prior_sigma[index];
     let each = group.parameters(model.form).into_iter().map(of);
@@ -140,8 +140,8 @@ fn stated_difference(group: Group, model: &Model) -> Option<f64> {
         .reduce(f64::max)
 }
 
-/// The size of a source that makes about as much as the white noise of its triad; `None` if the problem does not have
-/// it, or states all of its kind.
+/// The size at which the effect of a source is about that of the white noise of its triad; `None` if the problem does
+/// not have the source, or states all sources of its kind.
 fn not_stated(source: Source, problem: &Problem, moves: &Moves) -> Option<f64> {
     let (model, sensor) = (&problem.model, source.triad());
     let table = model.aiding == Aiding::Table;

@@ -8,11 +8,11 @@ use crate::calibration::{
 use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Sensor};
 use crate::run::Aiding;
 
-/// An axis works if its scale factor is farther from zero than this many σ.
+/// An axis counts as working if its scale factor is farther from zero than this many σ.
 const SENSES: f64 = 5.0;
 
-/// Both triads from positions, with the prior for parameters that these do not determine. If the positions alone
-/// contradict the prior, it is widened, with a finding.
+/// Both triads from positions, with the prior for parameters that the positions do not determine. If the positions
+/// alone contradict the prior, it is widened, with a finding.
 pub fn both_triads(
     observed: &PerSensor<Observed>,
     problem: &Problem,
@@ -28,7 +28,7 @@ pub fn both_triads(
         set_covariance(&mut covariance, sensor, fits.get(sensor));
         findings.extend(fits.get(sensor).residuals.finding(sensor.name()));
     }
-    // Both triads stand on one table, where there is one.
+    // If there is a table, both triads are on it.
     let [gyro, accel] = Sensor::ALL.map(|sensor| parameter(sensor, 0));
     for (number, by_gyro) in &fits.gyro.by_table {
         let Some(by_accel) = fits.accel.by_table.get(number) else {
@@ -58,13 +58,13 @@ fn along_table_axes(problem: &Problem) -> Model {
     model.in_form(problem.run(), model.form)
 }
 
-/// Both triads from positions alone; triads that these do not determine keep the prior.
+/// Both triads from positions alone; triads that the positions do not determine keep the prior.
 fn without_prior(observed: &PerSensor<Observed>, model: &Model) -> Estimate {
     let mut estimate = Estimate {
         triads: from_vector(model.form, &model.prior_mean),
         covariance: ParameterMatrix::zeros(),
     };
-    // An axis that may sense nothing has no direction, and σ of what is not linear are for small errors.
+    // An axis that may sense nothing has no direction, and the linearised σ are valid only for small errors.
     let senses = |fit: &Fit| {
         let sigma = |k: usize| fit.covariance[(k, k)].sqrt();
         (0..3).all(|k| fit.triad.scale[k].abs() > SENSES * sigma(k))

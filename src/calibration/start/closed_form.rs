@@ -1,5 +1,5 @@
-//! The closed form: static positions with known attitude (Zhao, Jiang, Li 2016, Eqs. 14 and 15; the second line of the
-//! printed Eq. 15 says `N_g` where the accelerometer is meant), and its substitutes without a table.
+//! The closed form: static positions with known attitude (Zhao, Jiang, Li 2016, Eqs. 14 and 15; in the second line of
+//! the printed Eq. 15, `N_g` means the accelerometer), and its substitutes without a table.
 
 use super::both_triads::both_triads;
 use super::coarse::{Turned, calibrated, dwells};
@@ -92,7 +92,7 @@ pub fn six_position(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
     six_position_by(reference, problem)
 }
 
-/// As [`six_position`], with a given source of the reference inputs; labels need no dwells.
+/// Does the same as [`six_position`], with a given source of the reference inputs; labels need no dwells.
 pub fn six_position_by(
     reference: Reference,
     problem: &Problem,
@@ -216,8 +216,8 @@ fn by_labels(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
     })
 }
 
-/// The closed form from every dwell and every move with gravity as the only reference, with the prior if there are too
-/// few.
+/// The closed form from every dwell and every move with gravity as the only reference; with the prior, if there are too
+/// few dwells and moves.
 fn by_gravity(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
     let rests = dwells(problem)?;
     let Turned { at, equations, .. } = calibrated(problem, &rests)?;
@@ -252,6 +252,6 @@ fn hidden(model: &Model, estimate: &Estimate, reference: Reference) -> Option<Fi
         Reference::Labels => "these sections",
         Reference::Gravity => "these dwells and moves",
     };
-    // They are stated as the closed form gives them.
+    // The values are stated as the closed form gives them.
     not_observed(by, hidden).map(|finding| finding.at(Level::Care))
 }

@@ -15,7 +15,7 @@ use crate::calibration::{
 use crate::earth::Site;
 use crate::imu::{Sensor, TermVector};
 
-/// With more equations (a hundred dwells), parameters cannot absorb noise.
+/// Number of equations (a hundred dwells) above which parameters cannot absorb noise.
 const MOST_EQUATIONS: usize = 600;
 /// Maximum number of linearisation points at which noise is estimated.
 const NOISE_ROUNDS: usize = 6;
@@ -24,7 +24,7 @@ const SMALL: f64 = 1e-6;
 /// Attitudes, heading and gyros are estimated alternately. Scale factor errors of several percent need four rounds with
 /// the gyros alone.
 const ROUNDS_OF_GYROS: usize = 4;
-/// Number of rounds in all, the later ones with the accelerometers.
+/// Total number of rounds; the later ones include the accelerometers.
 const ROUNDS: usize = 8;
 
 /// Starting point of the filter.
@@ -58,7 +58,8 @@ pub fn coarse_start(problem: &Problem) -> Result<CoarseStart, CalibrationError> 
     if let Some(attitudes) = attitudes_of_table(problem) {
         let mut first = from_vector(problem.model.form, &problem.model.prior_mean);
         first.gyro.bias = gyro_bias_at_rest(&dwells);
-        // Equations of constants lead astray what warms: a bias that drifts for an hour turns by radians.
+        // Equations with constant parameters fail for an instrument that warms up: a bias that drifts for an hour adds
+        // up to radians.
         let smallest = ParameterVector::repeat(SMALL);
         let triads = match problem.model.thermal {
             Some(_) => first,
@@ -198,7 +199,7 @@ fn turned(
     })
 }
 
-/// The estimate with the noise added by hand motion, if the data show this noise although the residuals do not.
+/// The estimate with the noise added by hand motion, if the data show this noise but the residuals do not.
 fn calibrated_as_held(
     problem: &Problem,
     dwells: &[Vec<AtRest>],
@@ -207,7 +208,7 @@ fn calibrated_as_held(
     if stated.equations.rows.len() > MOST_EQUATIONS {
         return Ok((stated, None));
     }
-    // Residuals tell noise of all equations, where there are enough of them; else only the prior does.
+    // If there are enough equations, the residuals show the noise of all of them; otherwise, only the prior does.
     let solution = stated.equations.solved();
     let tell = solution.is_none_or(|solution| solution.residuals.are_large());
     if tell || problem.options.noise == NoisePolicy::Stated {
@@ -223,9 +224,9 @@ fn calibrated_as_held(
     let Some(mut by_hand) = likeliest(&stated, &ByHand::default()) else {
         return Ok((stated, None));
     };
-    // What equations are linearised at follows noise, and noise that.
+    // The linearisation point depends on the noise, and the noise on the linearisation point.
     for _ in 0..NOISE_ROUNDS {
-        // What noise on trial leads nowhere with is not the noise of this recording.
+        // If the estimate fails with a trial noise, this is not the noise of the recording.
         let Ok(turned) = with(&by_hand) else {
             return Ok((stated, None));
         };

@@ -32,8 +32,8 @@ pub fn gyrocompass(
 ) -> Result<(Vec<Heading>, Vector3<f64>), CalibrationError> {
     let triad = &triads.gyro;
     let correction = triad.correction().ok_or_else(|| singular(triads))?;
-    // Unknown: b, and for each stretch Earth rate along its two level axes. Before any rate is observed
-    // none exceeds Earth rate by much: b is the remainder of a bias taken from these very rates.
+    // Unknown: b, and for each stretch Earth rate along its two level axes. The prior of each is about Earth rate,
+    // because b is the remainder of a bias taken from these same rates.
     let n = 3 + 2 * stretches.len();
     let first = |stretch: usize| 3 + 2 * stretch;
     let mut information = DMatrix::<f64>::identity(n, n) / ROTATION_RATE.powi(2);
@@ -46,7 +46,7 @@ pub fn gyrocompass(
             rows.fixed_columns_mut::<3>(0).copy_from(attitude);
             rows[(0, first(stretch))] = 1.0;
             rows[(1, first(stretch) + 1)] = 1.0;
-            // Tilts of a milliradian turn that much of Earth rate.
+            // A tilt of one milliradian turns this part of Earth rate.
             let by_tilt = (1e-3 * ROTATION_RATE).powi(2);
             let turning = model.turning_at_rest.powi(2) / dwell.duration();
             let weight = 1.0 / (dwell.mean.gyro.variance + turning + by_tilt);
@@ -62,7 +62,7 @@ pub fn gyrocompass(
     let heading = |(stretch, of_stretch): (usize, &Stretch)| {
         let first = first(stretch);
         let (east, north) = (found[first], found[first + 1]);
-        // Where nothing but rounding is found, as of a single dwell, the heading stays as it is.
+        // If the result is only rounding, as for a single dwell, the heading remains unchanged.
         let angle = if east.hypot(north) > ROUNDING * ROTATION_RATE {
             north.atan2(east) - std::f64::consts::FRAC_PI_2
         } else {
@@ -92,7 +92,7 @@ pub fn add_rates(
     let triad = &triads.gyro;
     let correction = triad.correction().ok_or_else(|| singular(triads))?;
     let earth_rate = stretch.run.site.earth_rate_n();
-    // Earth rate by a heading that is wrong by an angle of one.
+    // Change of Earth rate per radian of heading error.
     let turned = Vector3::z().cross(&earth_rate);
     let of_heading = (ROTATION_RATE * heading.known()).powi(2);
     for (attitude, dwell) in chain.attitudes.iter().zip(dwells) {

@@ -1,4 +1,4 @@
-//! Elimination of errors that are common to several rows, at a cost in proportion to the number of events.
+//! Elimination of errors that are common to several rows, at a cost proportional to the number of events.
 //!
 //! Common errors are unknowns with a prior: they enter with the first event that they affect, and leave after the last.
 //! One triangular factor of the parameters remains (square-root information filter; Bierman 1977,
@@ -11,8 +11,8 @@ use nalgebra::{DMatrix, RowVector3};
 use super::equations::{Common, Equations, Rows};
 use crate::imu::{PerSensor, Sensor};
 
-/// Smallest variance of a mean bias variation that its value before leaves, divided by the stationary one: smaller ones
-/// are rounding.
+/// Smallest variance of a mean bias variation given its previous value, divided by the stationary variance; smaller
+/// values are rounding errors.
 const ROUNDING: f64 = 1e-8;
 
 /// A row divided by the σ of its independent error.
@@ -23,7 +23,7 @@ struct Scaled<'a> {
 }
 
 impl Scaled<'_> {
-    /// The prior of one component of an error of this σ.
+    /// The prior of one component of an error with this σ.
     fn prior(of: Common, axis: usize, sigma: f64) -> Self {
         Self {
             errors: vec![(of, unit(axis) / sigma)],
@@ -36,7 +36,7 @@ fn unit(axis: usize) -> RowVector3<f64> {
     RowVector3::from_fn(|_, column| f64::from(u8::from(column == axis)))
 }
 
-/// Triangular factor: three columns for each error that is left, then the unknowns and the residual.
+/// Triangular factor: three columns for each remaining error, then the unknowns and the residual.
 pub struct Eliminated {
     errors: Vec<Common>,
     r: DMatrix<f64>,
@@ -72,7 +72,7 @@ impl Eliminated {
             .collect()
     }
 
-    /// Takes in the rows of an event, and eliminates the errors that are over.
+    /// Adds the rows of an event, and eliminates the errors that affect no later event.
     fn take(&mut self, unknown: &[usize], rows: &[Scaled], is_over: impl Fn(&Common) -> bool) {
         let new = rows
             .iter()
@@ -165,7 +165,7 @@ impl Equations {
         eliminated
     }
 
-    /// The prior of an error, given those before.
+    /// The prior of an error, given the preceding errors.
     fn prior_of(&self, of: Common, drifted: &mut PerSensor<Option<usize>>) -> Vec<Scaled<'static>> {
         let with_drift = match of {
             Common::Noise(sensor, event) => self.with_drift(sensor, event, drifted.get_mut(sensor)),
@@ -178,8 +178,8 @@ impl Equations {
         })
     }
 
-    /// The prior of mean noise and of the bias variation at the end of an event, given the variation at the end of one
-    /// before; `None` if the bias does not vary.
+    /// The prior of mean noise and of the bias variation at the end of an event, given the variation at the end of an
+    /// earlier event; `None` if the bias does not vary.
     fn with_drift(
         &self,
         sensor: Sensor,
@@ -191,7 +191,7 @@ impl Equations {
         let least = ROUNDING * drift.variance;
         let of_mean = drift.mean * drift.since;
         let of_end = drift.decay * drift.since;
-        // Covariance of mean and end, given the value before.
+        // Covariance of mean and end value, given the previous value.
         let mean = (event.variance.get(sensor) - drift.variance * of_mean.powi(2)).max(least);
         let across = drift.variance * (drift.mean - of_mean * of_end);
         let slope = across / mean;

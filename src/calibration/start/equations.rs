@@ -41,12 +41,12 @@ pub struct Drift {
     pub mean: f64,
     /// Value at the other end, divided by the value at one end.
     pub decay: f64,
-    /// Value at the begin, divided by the value at the end of the event before; zero without an event before.
+    /// Value at the beginning, divided by the value at the end of the preceding event; zero without a preceding event.
     pub since: f64,
 }
 
 impl Event {
-    /// `None` if the bias of a triad does not vary.
+    /// Bias variation of a triad over the event; `None` if its bias does not vary.
     pub fn drift(&self, sensor: Sensor, before: Option<&Self>) -> Option<Drift> {
         let GaussMarkov {
             sigma,
@@ -82,7 +82,7 @@ pub struct Rows<const N: usize> {
     pub event: usize,
     pub partials: Partials<N>,
     pub residual: SVector<f64, N>,
-    /// Variance for the weight of each.
+    /// Variance used for the weight of each row.
     pub weighted: SVector<f64, N>,
     /// Variance of the independent part of the error.
     pub own: SVector<f64, N>,
@@ -121,7 +121,7 @@ pub struct Equations {
 }
 
 impl Equations {
-    /// Equations with this mean and σ of the prior of δθ; parameters with σ = 0 are not estimated.
+    /// Equations with this prior mean and σ of δθ; parameters with σ = 0 are not estimated.
     pub fn new(mean: &ParameterVector, sigma: &ParameterVector) -> Self {
         let unknown: Vec<usize> = (0..PARAMETERS).filter(|&k| sigma[k] > 0.0).collect();
         let count = unknown.len();
@@ -135,7 +135,7 @@ impl Equations {
         }
     }
 
-    /// Equations for the parameters of some triads, about these values.
+    /// Equations for the parameters of some triads, linearised about these values.
     pub fn of_triads(model: &Model, at: &PerSensor<Triad>, sensors: &[Sensor]) -> Self {
         let of = |k| sensors.contains(&sensor_and_parameter(k).0);
         let sigma = |k: usize, _| if of(k) { model.prior_sigma[k] } else { 0.0 };
@@ -177,7 +177,7 @@ impl Equations {
         )
     }
 
-    /// As [`Self::scaled`], with the unknowns in units of their prior σ.
+    /// Does the same as [`Self::scaled`], with the unknowns in units of their prior σ.
     pub fn in_sigmas(&self) -> (DMatrix<f64>, DVector<f64>) {
         let (design, residual) = self.scaled();
         (design * DMatrix::from_diagonal(&self.sigma), residual)
@@ -258,8 +258,8 @@ pub fn of<const N: usize>(sensor: Sensor, partials: &OfTriad<N>) -> Partials<N> 
     whole
 }
 
-/// Partial derivatives of `A u + D` with respect to `A` and `D`, row by row, for `[u; 1]`; for `[u; 0]`, of an output
-/// without bias.
+/// Partial derivatives of `A u + D` with respect to `A` and `D`, row by row, for `[u; 1]`; with `[u; 0]`, those of an
+/// output without bias.
 pub fn of_sensitivity(input: Vector4<f64>) -> OfTriad<3> {
     Matrix3::identity().kronecker(&input.transpose())
 }
@@ -269,7 +269,7 @@ pub fn of_parameters(triad: &Triad, input: &Vector3<f64>) -> OfTriad<3> {
     OfTriad::from_columns(&triad.response().map(|response| response * input.push(1.0)))
 }
 
-/// Iterates from a first point with a step from each, until no parameter changes by more than this.
+/// Iterates from a first point, with one step from each point, until no parameter changes by more than this.
 pub fn gauss_newton(
     from: PerSensor<Triad>,
     smallest: &ParameterVector,

@@ -27,7 +27,7 @@ pub struct AtRest {
     /// Number among the dwells of all stretches.
     pub number: usize,
     pub samples: Range<usize>,
-    /// Begin and end, s.
+    /// Start and end, s.
     pub times: [f64; 2],
     pub mean: PerSensor<MeanOutput>,
 }
@@ -54,7 +54,7 @@ impl AtRest {
         of_stretch.collect()
     }
 
-    /// s
+    /// Duration of the dwell, s.
     pub fn duration(&self) -> f64 {
         self.times[1] - self.times[0]
     }
@@ -99,7 +99,7 @@ pub fn input_errors(triad: &Triad, correction: &Matrix3<f64>, input: &Vector3<f6
     correction * of_parameters(triad, input)
 }
 
-/// Response of rows to the mean noise of a triad over an event, which equals the response to its biases.
+/// Response of rows to the mean noise of a triad over an event; it equals the response to the biases.
 pub fn of_noise<const N: usize>(
     sensor: Sensor,
     event: usize,
@@ -111,7 +111,7 @@ pub fn of_noise<const N: usize>(
 
 /// The mean specific force in a dwell.
 struct Force {
-    /// m/s²; not zero.
+    /// Magnitude, m/s²; not zero.
     size: f64,
     /// Up along body axes.
     up: Vector3<f64>,
@@ -183,7 +183,7 @@ impl Heading {
         self.sigma.clamp(1e-3, 1.0)
     }
 
-    /// Response of rows to its error, from their change per radian.
+    /// Response of rows to the heading error, from their change per radian.
     pub fn error<const N: usize>(
         &self,
         by_angle: &SVector<f64, N>,
@@ -202,15 +202,15 @@ pub struct Chain {
 
 /// A move from one dwell to the next.
 struct Move {
-    /// s
+    /// Duration of the move, s.
     duration: f64,
     /// Tilt error of the gyros after the move, `C_computed = (I − [φ×]) C_true`.
     tilt: Vector3<f64>,
     /// Tilt error per error of each gyro parameter.
     of_gyro: OfTriad<3>,
-    /// Tilt error per error of each accelerometer parameter, due to Up before the move.
+    /// Tilt error per error of each accelerometer parameter, through Up before the move.
     of_before: OfTriad<3>,
-    /// Tilt error per error of each accelerometer parameter, due to Up after the move.
+    /// Tilt error per error of each accelerometer parameter, through Up after the move.
     of_after: OfTriad<3>,
     /// Variance of each tilt component due to noise and interpolation of the gyros.
     walk: f64,
@@ -221,7 +221,7 @@ struct Move {
 }
 
 impl Chain {
-    /// Starts from an attitude in the first dwell, which is levelled.
+    /// Starts from an attitude in the first dwell and levels it.
     ///
     /// Source: Tedaldi, Pretto, Menegatti 2014, "A robust and easy to implement method for IMU calibration
     /// without external equipments", ICRA, §IV.
@@ -253,7 +253,7 @@ impl Chain {
         heading: &Heading,
     ) {
         let earth_rate = stretch.run.site.earth_rate_n();
-        // Earth rate by a heading that is wrong by an angle of one.
+        // Change of Earth rate per radian of heading error.
         let turned = Vector3::z().cross(&earth_rate);
         for (turn, pair) in self.moves.iter().zip(dwells.windows(2)) {
             let level = |of: &OfTriad<3>| (heading.turn * of).fixed_rows::<2>(0).into_owned();
@@ -261,7 +261,7 @@ impl Chain {
             let [of_before, of_after] = [&turn.of_before, &turn.of_after].map(level);
             let [before, after] = [&pair[0], &pair[1]].map(AtRest::event);
             let event = after - 1;
-            // As much of Earth rate as the heading may be wrong by, all of it at most.
+            // The part of Earth rate that the heading uncertainty makes unknown, at most all of it.
             let of_heading = (ROTATION_RATE * heading.known() * turn.duration).powi(2);
             let of_accel = of(Sensor::Accel, &(of_before + of_after));
             let residual = (heading.turn * turn.tilt).xy();
@@ -308,13 +308,13 @@ impl Move {
         let tilt = tilt(&(block.state.attitude * forces[1].up));
         let attitude = exp(tilt) * block.state.attitude;
         let level = -skew(Vector3::z());
-        // East and North: alike except for what is interpolated.
+        // East and North are alike, except for interpolated samples.
         let level_variance = |noise: &PerSensor<ProcessNoise>| {
             let drifted = block.noise.covariance(noise);
             0.5 * (drifted[(0, 0)] + drifted[(1, 1)])
         };
         let interpolated = level_variance(&PerSensor::default());
-        // Up is that of the middle of a dwell, from whose end the gyros carry it.
+        // Up is measured at the middle of a dwell; the gyros carry it from the end of the dwell.
         let held = (before.duration() + after.duration()) / 3.0;
         let walk = level_variance(&model.process_noise()) + model.turning_at_rest.powi(2) * held;
         let of_gravity = |dwell: &AtRest| dwell.mean.accel.variance / run.site.gravity.powi(2);

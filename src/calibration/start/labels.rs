@@ -1,6 +1,6 @@
 //! Equations from labels: the instrument is placed by hand with each axis up and down and turned about each axis.
 //!
-//! North is unknown, but common to all sections with the same heading, and turns carry it along.
+//! North is unknown, but common to all sections with the same heading; turns rotate it along with the instrument.
 //!
 //! Source: Ferraris, Grimaldi, Parvis 1995, "Procedure for effortless in-field calibration of
 //! three-axial rate gyro and accelerometers", *Sensors and Materials* 7(5), without the gyros'
@@ -21,7 +21,7 @@ use crate::run::{Dwell, MeanOutput, Run};
 
 /// Step of the integration of turns, s; within one step, a hand turns by a few degrees.
 const STEP: f64 = 0.02;
-/// The mean reduction of all inputs by tilts.
+/// The number of the common error that represents the mean reduction of all inputs by tilts.
 const SHORTENED: Common = Common::Unit(usize::MAX);
 
 /// The used part of a labelled section.
@@ -31,7 +31,7 @@ pub struct Section {
     pub motion: LabelledMotion,
     /// Mean output of each triad.
     pub mean: PerSensor<MeanOutput>,
-    /// Begin and end, s.
+    /// Start and end, s.
     times: [f64; 2],
 }
 
@@ -79,7 +79,7 @@ impl Used {
                 continue;
             }
             let used = check.as_labelled.clone();
-            // Borders that are drawn a little wide do no harm.
+            // Borders that are a little too wide do no harm.
             let as_stated = used.as_ref() == Some(&segment.samples);
             if check.disagreement.is_some() && !as_stated {
                 found.contradicted.push(check);
@@ -108,7 +108,7 @@ fn of_gyros(run: &Run, rests: &[Rest], sections: &[Section]) -> Vec<Known> {
     let sigma = run.segment_sigma;
     let level = run.site.earth_rate_n().y;
     let directions = directions(run, rests, sections);
-    // After those of the directions: the rests in which turns begin and end, or ends for themselves.
+    // Numbers after those of the directions: the rests in which turns begin and end, or single ends.
     let first = directions.iter().map(|of| of.number + 1).max().unwrap_or(0);
     let mut ends: Vec<Option<usize>> = Vec::new();
     let mut number_of_end = |sample: usize| {
@@ -129,8 +129,8 @@ fn of_gyros(run: &Run, rests: &[Rest], sections: &[Section]) -> Vec<Known> {
             let mut errors = Vec::new();
             let (carried, position) = match section.motion {
                 LabelledMotion::Stands { up } => {
-                    // A tilt brings some of what is level of Earth's rate to the axis that is up, and a turn about
-                    // that axis some to the other one that is level.
+                    // A tilt moves part of the horizontal Earth rate to the upward axis, and a rotation about that axis
+                    // moves part of it to the other level axis.
                     let tilted = up.component_mul(&up) + across(&up) * 0.5;
                     let noise = noise + tilted * (level * sigma).powi(2);
                     (
@@ -141,8 +141,8 @@ fn of_gyros(run: &Run, rests: &[Rest], sections: &[Section]) -> Vec<Known> {
                 LabelledMotion::Turns { axis, angle } => {
                     let carried = mean_turned_back(run, section);
                     let rate = axis * (angle / section.duration()) + carried * direction.known;
-                    // Both ends are set by hand: off by an angle about the turn's axis, one angle in all turns that begin
-                    // or end in that position, and by angles across it.
+                    // Both ends are set by hand. Each is wrong by an angle about the axis of the turn, common to all
+                    // turns that begin or end in that position, and by angles across this axis.
                     let of_end = axis * axis.transpose() * (sigma / section.duration());
                     let last = section.samples.end.saturating_sub(1);
                     let begin = number_of_end(section.samples.start);
@@ -200,7 +200,7 @@ fn force_by_hand(
     }
 }
 
-/// An input along or about an axis that is misplaced by about a degree, with this noise.
+/// An input along or about an axis that is misaligned by about a degree, with this noise.
 ///
 /// To first order, the misplacement rotates the input into the other two axes. Along the axis it reduces the input to
 /// second order, by half the sum of two squared angles. The mean of this is σ², the same for all positions
@@ -238,7 +238,7 @@ fn shortened(position: &Position, sigma: f64) -> Matrix3<f64> {
     shortened
 }
 
-/// As above, with the tilts about each axis of the position with this number.
+/// The mean reduction of an input by tilts, and the tilts about each axis of the position with this number.
 fn by_tilts(position: &Position, sigma: f64, number: usize) -> [(Common, Matrix3<f64>); 2] {
     let tilts = skew(position.input) * sigma;
     [
@@ -250,7 +250,7 @@ fn by_tilts(position: &Position, sigma: f64, number: usize) -> [(Common, Matrix3
 /// Earth rate along body axes at the start of a section.
 #[derive(Debug, Clone, Copy)]
 struct Direction {
-    /// The part common to all sections.
+    /// The part of Earth rate common to all sections.
     number: usize,
     known: Vector3<f64>,
     /// 1σ of the remainder.
@@ -263,7 +263,7 @@ fn rest_at(rests: &[Rest], sample: usize) -> Option<usize> {
     rests.iter().position(is_in)
 }
 
-/// Earth rate at the start of each section. A turn that starts in a labelled dwell uses that of the dwell.
+/// Earth rate at the start of each section. A turn that starts in a labelled dwell uses the Earth rate of that dwell.
 fn directions(run: &Run, rests: &[Rest], sections: &[Section]) -> Vec<Direction> {
     let rate = run.site.earth_rate_n();
     let mut next = 0;
@@ -325,7 +325,7 @@ fn share_heading(
     let (one, other) = (one.mean.gyro, other.mean.gyro);
     let off = one.output - other.output;
     let off = (off - up * up.dot(&off)).norm_squared();
-    // Either is turned about the plumb line by hand.
+    // Each section may be rotated by hand about the vertical.
     let same = one.variance + other.variance + (level * hand_sigma).powi(2);
     let apart = same + level.powi(2);
     // −2 ln of the likelihoods of both level axes.
@@ -442,7 +442,7 @@ mod tests {
         // Of first order in the tilts, and so as normal as they are.
         let (low, high) = mean_square_interval(6 * SETS, 1e-3);
         assert!((low..=high).contains(&squares[1]));
-        // Of second order: squares of squares, whose mean is as stated but spreads widely.
+        // Second order: squares of squares; their mean is as stated, but they scatter widely.
         assert!((0.5..1.5).contains(&squares[0]), "scale {}", squares[0]);
         assert!((0.5..1.5).contains(&squares[2]), "bias {}", squares[2]);
     }

@@ -1,4 +1,5 @@
-//! Least squares of [`Equations`]: one triangular factor, and one factor of all σ (Birge 1932, Physical Review 40).
+//! Least-squares solution of [`Equations`]: one triangular factor, and one common factor for all σ (Birge 1932,
+//! Physical Review 40).
 
 use std::collections::BTreeMap;
 
@@ -22,8 +23,8 @@ pub struct Solution {
 }
 
 impl Equations {
-    /// Least-squares δθ with the prior and rows weighted by their variances, which are larger by the Birge ratio: where
-    /// noise is understated, rows must not move what they hardly show far from the prior.
+    /// Least-squares δθ with the prior and rows weighted by their variances, increased by the Birge ratio: if noise is
+    /// understated, rows must not move parameters that they hardly show far from the prior.
     ///
     /// # Errors
     /// [`CalibrationError::Singular`] with the triad of an unknown that is not a number.
@@ -72,7 +73,8 @@ impl Equations {
             let (step, covariance) = self.with_prior(&factor, residuals.growth())?;
             (step, covariance, residuals)
         } else {
-            // Weights are not the inverse of the variances: the errors leave so much of the sum of weighted squares.
+            // The weights are not the inverse of the variances, so the expected sum of weighted squares is computed
+            // from the errors.
             let scores = self.scores();
             let expected = self.weighted_variance() - (&scores * &as_stated).trace();
             let residuals = residuals(left * degrees as f64 / expected, &step);
@@ -106,7 +108,7 @@ impl Equations {
         all.qr().r()
     }
 
-    /// δθ and its covariance from such a factor, with σ of the rows widened, and the prior.
+    /// δθ and its covariance from such a factor, with widened σ of the rows, and the prior.
     fn with_prior(
         &self,
         factor: &DMatrix<f64>,
@@ -149,7 +151,7 @@ impl Equations {
         sum
     }
 
-    /// Adds what the bias variation of a triad makes common to different events.
+    /// Adds the covariance between different events due to the bias variation of a triad.
     fn add_drift(
         &self,
         sum: &mut DMatrix<f64>,
@@ -177,7 +179,7 @@ impl Equations {
         }
     }
 
-    /// Sum of the variances of all rows, each divided by that of its weight.
+    /// Sum of the variances of all rows, each divided by the variance of its weight.
     fn weighted_variance(&self) -> f64 {
         let rows = self.rows.iter();
         rows.map(|row| self.variance(row) / row.weighted.x).sum()
@@ -206,7 +208,7 @@ impl Equations {
         event.map_or([0.0; 2], |event| event.times)
     }
 
-    /// Rows of the unknowns among those of all parameters.
+    /// Selects the rows of the unknowns among those of all parameters.
     fn expanded<const N: usize>(&self, of_unknowns: &DMatrix<f64>) -> SMatrix<f64, PARAMETERS, N> {
         let mut all = SMatrix::<f64, PARAMETERS, N>::zeros();
         for (&index, row) in self.unknown.iter().zip(of_unknowns.row_iter()) {

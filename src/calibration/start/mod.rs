@@ -1,6 +1,6 @@
 //! Start of the iterations: closed form, coarse start and axis order.
 //!
-//! One set of equations ([`equations`]) with four kinds of rows: from a table, labels, gravity and Earth rate.
+//! One set of equations ([`equations`]) has four kinds of rows: from a table, labels, gravity and Earth rate.
 
 mod both_triads;
 pub mod closed_form;

@@ -41,7 +41,7 @@ pub struct Position {
 #[derive(Debug, Clone)]
 pub struct Known {
     pub position: Position,
-    /// Begin and end, s.
+    /// Start and end, s.
     pub times: [f64; 2],
     /// Response of the input to unit-covariance errors.
     pub errors: Vec<(Common, Matrix3<f64>)>,
@@ -72,7 +72,7 @@ impl Observed {
         inputs.fold(0.0, f64::max)
     }
 
-    /// Adds the equations of the outputs about a sensitivity and a bias.
+    /// Adds the equations of the outputs, linearised about a sensitivity and a bias.
     fn add(
         &self,
         mut equations: Equations,
@@ -166,7 +166,7 @@ impl Observed {
     }
 
     /// One triad from positions alone: least squares for `A = K C` and `D` row by row, then the split of the form.
-    /// `None` if fewer than four positions, or positions that leave a row undetermined.
+    /// `None` for fewer than four positions, or for positions that leave a row undetermined.
     pub fn determined(&self, form: InstallationForm) -> Option<Fit> {
         let mut rows = TriadVector::from_column_slice(Matrix4x3::identity().as_slice());
         let mut equations = self.of_sensitivity(sensitivity_and_bias(&rows));
@@ -236,8 +236,8 @@ fn in_a_plane(equations: &Equations) -> bool {
 }
 
 /// One triad from positions without common errors: least squares for `A = K C` and `D` row by row, then the split of
-/// the form. `None` if fewer than four positions or positions that leave a row undetermined. Gives the triad and the
-/// covariance of its parameters.
+/// the form. Returns the triad and the covariance of its parameters; `None` for fewer than four positions, or for
+/// positions that leave a row undetermined.
 pub fn six_position_triad(
     positions: &[Position],
     form: InstallationForm,
@@ -248,7 +248,7 @@ pub fn six_position_triad(
         errors: Vec::new(),
     });
     let observed = Observed {
-        // Of either triad alike.
+        // Either triad would do.
         sensor: Sensor::Gyro,
         noise: Noise::default(),
         known: known.collect(),

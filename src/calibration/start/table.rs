@@ -28,8 +28,8 @@ pub fn sensed(site: &Site, sensor: Sensor) -> Vector3<f64> {
 /// Mean outputs in some dwells of the first run of the problem, with inputs from the table attitudes; `None` without a
 /// table.
 ///
-/// An attitude error `C_true = (I + [e×]) C_read` causes an input error of `C_readᵀ [u_n×] e`, from base, axes,
-/// position and readings.
+/// An attitude error `C_true = (I + [e×]) C_read` causes an input error of `C_readᵀ [u_n×] e`, from errors of base,
+/// axes, position and readings.
 pub fn positions(problem: &Problem, dwells: &[Dwell], sensor: Sensor) -> Option<Observed> {
     let (run, model) = (problem.run(), &problem.model);
     let axes = &model.geometry.axes;
@@ -111,7 +111,7 @@ fn add_carried(
         let state = State::at_rest(attitude);
         Navigator::new(imu, &run.site, triads, state).ok_or_else(|| singular(triads))
     };
-    // φ of a block's end against the dwell's attitude.
+    // φ at the end of a block, relative to the attitude of the dwell.
     let off = |block: &Block| -log(&(block.state.attitude * attitude.transpose()));
     if let Some((before, start)) = before.and_then(|before| Some((before, read(before)?))) {
         let turn = at_rest(start)?.advance(before.samples.end..dwell.samples.start);
@@ -129,7 +129,7 @@ fn add_carried(
     let stand = navigator.standing(&navigator.state.attitude, dwell.samples.clone());
     let variance = imu.pulse.gyro.powi(2) / 6.0 + walk.gyro * stand.duration;
     add(equations, &stand, 0, off(&stand), variance);
-    // A tilt of the table turns gravity into velocity.
+    // A tilt of the table makes gravity change the velocity.
     let variance = (run.site.gravity * stand.duration).powi(2) * attitude_variance
         + walk.accel * stand.duration
         + imu.pulse.accel.powi(2) / 6.0;

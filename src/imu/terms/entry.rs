@@ -31,7 +31,7 @@ pub struct TermEntry {
     pub help: &'static str,
     /// Formula of the term: its addition to specific force f or angular rate w for a parameter q.
     pub adds: &'static str,
-    /// Moves or dwells that show the term, where a path does not.
+    /// Moves or dwells that show the term, if a path does not.
     pub shown_by: &'static str,
     /// The triad whose input the term changes.
     pub sensor: Sensor,
@@ -44,8 +44,8 @@ pub struct TermEntry {
     /// Default 1σ of each parameter, in `unit`: ten
     /// times the value of precise instruments.
     pub usual_sigma: f64,
-    /// Largest possible parameter, in SI: its effect equals gravity, or a rate of [`REFERENCE_RATE`], as in no
-    /// real instrument.
+    /// Largest possible parameter, in SI: its effect equals gravity, or a rate of [`REFERENCE_RATE`] (larger than in
+    /// any real instrument).
     pub largest: f64,
     /// Names of its parameters in files: common prefix and suffixes.
     pub parameters: (&'static str, &'static [&'static str]),

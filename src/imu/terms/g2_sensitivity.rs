@@ -1,5 +1,5 @@
-//! Gyro bias proportional to the square of specific force along its axis, as from a suspension or a resonator that
-//! yields under load.
+//! Gyro bias proportional to the square of specific force along its axis, for example from a suspension or resonator
+//! that yields under load.
 //!
 //! Source: IEEE Std 528-2019, acceleration-squared-sensitive drift rate (second power of one component).
 //! Products of two components are not included. Neither is |f|², which is the same in every dwell on Earth and
@@ -19,8 +19,8 @@ pub const ENTRY: TermEntry = TermEntry {
     unit: ("°/h/g²", DEG_PER_H / (STANDARD_GRAVITY * STANDARD_GRAVITY)),
     si_unit: "(rad/s)/(m/s^2)^2",
     d_si_unit: "\\radian\\second\\tothe{3}\\metre\\tothe{-2}",
-    // A wheel of mass M and angular momentum H on stiffnesses whose compliances differ by ΔC drifts by
-    // M² ΔC g² / H: with 50 g, 0.1 kg m²/s and 2 % of 10⁻⁶ m/N that is 0.01 °/h, of which ten times are usual.
+    // A wheel of mass M and angular momentum H on stiffnesses whose compliances differ by ΔC drifts by M² ΔC g² / H:
+    // with 50 g, 0.1 kg m²/s and 2 % of 10⁻⁶ m/N this is 0.01 °/h. The usual σ is ten times this value.
     usual_sigma: 0.1,
     largest: REFERENCE_RATE / (STANDARD_GRAVITY * STANDARD_GRAVITY),
     parameters: ("gyro.g2_sensitivity", &PER_AXIS),

@@ -1,4 +1,4 @@
-//! Gyro bias proportional to specific force, along and across their axes.
+//! Gyro bias proportional to specific force, along and across the gyro axes.
 
 use super::entry::{REFERENCE_RATE, TermEntry, set_rows};
 use crate::imu::Sensor;

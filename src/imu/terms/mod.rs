@@ -55,7 +55,7 @@ macro_rules! registry {
     };
 }
 
-// The order is that of the states, and of records that were written before: a new term goes last.
+// The order is that of the states and of existing files, so a new term must be last.
 registry! {
     /// Accelerometers add `q_i f_i²`; q in s²/m.
     AccelSecondOrder: accel_second_order::ENTRY,
@@ -153,7 +153,7 @@ impl Term {
         Some(format!("{stem}{end}"))
     }
 
-    /// The parameter of a name in files.
+    /// The parameter with this name in files.
     pub fn parameter_named(name: &str) -> Option<usize> {
         (0..TERM_PARAMETERS).find(|&k| Self::parameter_name(k).as_deref() == Some(name))
     }

@@ -80,7 +80,7 @@ impl Leg {
         self.changes[HEIGHT].peak_rate()
     }
 
-    /// The next time after this one where a third derivative jumps, the end at the latest.
+    /// The next time after this one at which a third derivative jumps, at the latest the end.
     pub fn next_break(&self, after: f64) -> f64 {
         self.changes
             .iter()
@@ -95,7 +95,7 @@ impl Kinematics {
     /// Pitch and roll in rad, each with its rate in rad/s.
     fn pitch_and_roll(&self, banks: bool) -> [(f64, f64); 2] {
         let Self([speed, heading, height]) = self;
-        // A body that does not climb may stand.
+        // A body that does not climb may be stationary.
         let pitch = if height.rate == 0.0 && height.acceleration == 0.0 {
             (0.0, 0.0)
         } else {

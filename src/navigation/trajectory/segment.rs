@@ -20,7 +20,7 @@ pub struct Start {
 /// Changes that start together. The segment ends with the last of them.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Segment {
-    /// Least duration, s.
+    /// Minimum duration, s.
     pub duration: f64,
     /// Turn by this angle, rad, clockwise positive.
     pub turn: Change,
@@ -35,8 +35,8 @@ pub struct Segment {
 pub struct Change {
     /// The change, or the new value.
     pub amount: f64,
-    /// Rate that the change reaches, per s.
+    /// Maximum rate of the change, per s.
     pub rate: f64,
-    /// Peak of the rate's own rate, per s².
+    /// Maximum second derivative of the change, per s².
     pub acceleration: f64,
 }

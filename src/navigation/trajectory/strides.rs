@@ -8,13 +8,13 @@ use super::Trajectory;
 use super::leg::Leg;
 use crate::navigation::Instant;
 
-/// The longest step, s: an eightieth of a radian of the Schuler oscillation, of which Runge and Kutta then keep
-/// the phase over 40 h to 1e-7 rad.
+/// The longest step, s: an eightieth of a radian of the Schuler oscillation, so that the Runge–Kutta method keeps its
+/// phase over 40 h to 1e-7 rad.
 const LONGEST: f64 = 10.0;
 /// The largest turn in a step, rad: Simpson's rule then integrates along a turn to 4e-8.
 const LARGEST_TURN: f64 = 0.1;
 
-/// The least number of steps between two breaks where motion is not steady.
+/// The minimum number of steps between two breaks if motion is not steady.
 const LEAST: u32 = 8;
 
 /// A step of smooth motion.
@@ -82,8 +82,8 @@ impl Strides<'_> {
         self.leg.at(time).instant(place, self.trajectory.banks)
     }
 
-    /// Continues until the given time, in s since the start, and passes on every stride. The computed solution rotates at
-    /// `beside` rad/s relative to the body.
+    /// Continues until the given time, in s since the start, and passes every stride to the caller. The computed
+    /// solution rotates at `beside` rad/s relative to the body.
     ///
     /// # Errors
     /// The first error returned for a stride.
@@ -117,7 +117,7 @@ impl Strides<'_> {
     fn steps(&self, to: f64, beside: f64) -> u32 {
         let duration = to - self.time;
         let middle = self.time + 0.5 * duration;
-        // Rates of heading are largest at an end, those of roll in the middle.
+        // Heading rates are largest at an end, roll rates in the middle.
         let place = self.here.truth.place();
         let rates = [self.time, middle, to].map(|time| self.at(time, place).rate.norm());
         let fastest = rates.into_iter().fold(0.0, f64::max);
@@ -131,11 +131,11 @@ impl Strides<'_> {
         let at =
             |after: f64, rate: &Vector2<f64>| self.at(from + after, start.place() + rate * after);
         let rate = start.position_rate().xy();
-        // Metres are enough for the middle: they change Earth rate and gravity by 1e-6 of themselves.
+        // An accuracy of metres is enough for the middle: Earth rate and gravity then change by a fraction of 1e-6.
         let middle = at(0.5 * duration, &rate);
         let rate_there = middle.truth.position_rate().xy();
         let mut end = at(duration, &rate_there);
-        // Simpson's rule.
+        // Integration by Simpson's rule.
         let mean = (rate + rate_there * 4.0 + end.truth.position_rate().xy()) / 6.0;
         end.truth.latitude = start.latitude + mean.x * duration;
         end.truth.longitude = start.longitude + mean.y * duration;

@@ -24,19 +24,19 @@ impl Limit {
         }
     }
 
-    /// The limit in σ if σ is itself an estimate with few degrees of freedom, by Wallace's
-    /// approximation of Student's distribution.
+    /// The limit in σ if σ is itself an estimate with few degrees of freedom, by Wallace's approximation of Student's t
+    /// distribution.
     pub fn of_student(&self, freedom: f64) -> f64 {
         let exponent = self.sigmas.powi(2) * (freedom - 1.5).max(0.0) / (freedom - 1.0).powi(2);
         (freedom * exponent.exp_m1()).sqrt()
     }
 
-    /// The quantile that one in a thousand of these values exceeds, and the limit of a statistic with the tail of
+    /// The quantile exceeded by one in a thousand of these values, and the limit of a statistic with the same tail as
     /// these values, in σ of the normal distribution.
     ///
     /// Two quantiles of the values are extrapolated to the limit by a power of the normal quantiles, so that the tail
-    /// may be heavier than normal, never lighter. A few faults among the values do not affect these quantiles.
-    /// `values` lose their order.
+    /// may be heavier than normal, never lighter. A few faults among the values do not affect these quantiles. `values`
+    /// are reordered.
     pub fn of_tail(&self, values: &mut [f64]) -> (f64, f64) {
         let rows = values.len();
         let [inner, outer] = TAIL.map(|part| {
@@ -45,7 +45,7 @@ impl Limit {
         });
         let [normal_inner, normal_outer] = TAIL.map(quantile);
         let power = (outer / inner).ln() / (normal_outer / normal_inner).ln();
-        // Where most values are zero nothing is seen of a tail.
+        // If most values are zero, no tail is visible.
         let power = if power.is_finite() {
             power.max(1.0)
         } else {

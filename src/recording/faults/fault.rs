@@ -11,7 +11,7 @@ pub struct Fault {
     pub kind: FaultKind,
     /// Triad and body axis (right, front, up); `None` if whole rows are affected.
     pub axis: Option<(Sensor, usize)>,
-    /// The samples; for a duplicate, the sample that occurs twice in the file.
+    /// The samples; for a duplicate, the sample that is repeated in the file.
     pub samples: Range<usize>,
     /// Line in the file: of the first sample, of the second of two equal rows, or of the last row
     /// before missing ones.
@@ -78,7 +78,7 @@ pub struct Bridge {
 }
 
 impl Bridge {
-    /// A bridge over these samples, without an axis yet.
+    /// A bridge over these samples, without axes so far.
     pub fn new(samples: Range<usize>) -> Self {
         Self {
             samples,

@@ -1,4 +1,5 @@
-//! Values impossible for an instrument at rest or on a turntable, as from a failed transfer or a counter underflow.
+//! Values impossible for an instrument at rest or on a turntable, for example from a failed transfer or a counter
+//! underflow.
 
 use std::ops::Range;
 
@@ -12,7 +13,8 @@ const FASTEST: f64 = 1000.0;
 const LARGEST_FORCE: f64 = 1e4;
 
 /// Rows that exceed the range of any instrument at nominal scales, and rows that are zero in all columns although
-/// gravity exceeds the smallest step, in row order. None of a kind if most rows are impossible, because then a unit is wrong.
+/// gravity exceeds the smallest step, in row order. If most rows are impossible, none of that kind are returned,
+/// because then a unit is wrong.
 pub fn impossible(rows: &Rows) -> Vec<FaultyRows> {
     let count = rows.columns[0].len();
     let found = |kind, column, is: &dyn Fn(usize) -> bool| {
@@ -27,7 +29,7 @@ pub fn impossible(rows: &Rows) -> Vec<FaultyRows> {
         let column = &rows.columns[k];
         found(FaultKind::Beyond, Some(k), &|row| column[row].abs() > limit)
     });
-    // With a fraction carried on, a sample of up to a step on each axis can be zero.
+    // If the remainder is carried over, a sample of up to one step on each axis can be zero.
     let shows = |k: usize| {
         let step = if rows.pulses {
             1.0

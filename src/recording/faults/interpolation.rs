@@ -7,8 +7,8 @@ use std::ops::Range;
 
 use fill::{Fill, MOST};
 
-/// Polynomials tried: degree, and samples used from either side. Each next one must agree with the
-/// best so far at the hole itself, because the stretches on which it is tested are farther away.
+/// Polynomials tried: degree, and samples used from either side. Each further polynomial must agree with the best one
+/// so far at the hole itself, because its test stretches are farther away.
 const CANDIDATES: [(usize, usize); 12] = [
     (1, 1),
     (1, 2),
@@ -23,11 +23,11 @@ const CANDIDATES: [(usize, usize); 12] = [
     (3, 32),
     (1, MOST),
 ];
-/// The same for a hole at the start or end of the recording.
+/// Polynomials for a hole at the start or end of the recording.
 const ONE_SIDED: [(usize, usize); 4] = [(0, 1), (0, 4), (0, 16), (0, MOST)];
 /// A hole and its neighbours may span this many times their own length, other holes included.
 const REACH: usize = 4;
-/// σ within which two ways to fill a hole agree.
+/// Number of σ within which two ways to fill a hole agree.
 const AGREE: f64 = 3.0;
 
 /// The interpolations available for a range of faulty samples, on any axis.
@@ -80,7 +80,7 @@ impl<'a> Hole<'a> {
             best.fill.apply(axis);
             return Some(best.variance);
         }
-        // Nobody may integrate over these, but what is read there must not be wild.
+        // Nothing is integrated over these samples, but values read there must not be wild.
         let [before, after] = self.sides.each_ref().map(|side| side.first());
         let [before, after] = [before, after].map(|end| end.map(|&k| axis[k]));
         let from = before.or(after).unwrap_or(0.0);
@@ -99,7 +99,7 @@ impl<'a> Hole<'a> {
         }
         let [narrowest, widest] = self.extremes.get_or_init(|| self.both()).as_ref()?;
         let halves = widest.measured(axis, 2.0 * rounding)?;
-        // Not chosen among others by either half, so that both tell its error.
+        // This fill was not selected by either half, so both halves show its error.
         let variance = halves.iter().sum::<f64>() / 2.0;
         let sum = widest.sum(axis);
         let apart = (sum - narrowest.sum(axis)).powi(2);
@@ -130,7 +130,8 @@ impl<'a> Hole<'a> {
                     fill,
                     sum,
                     first_half: halves[0],
-                    // The least of many by the first half is too small by chance; the second half knows.
+                    // The smallest error of many fills on the first half is too small by chance; the second half gives
+                    // the actual error.
                     variance: halves[0].max(halves[1]),
                 });
             }

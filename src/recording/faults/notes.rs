@@ -1,4 +1,4 @@
-//! Faults in words.
+//! Descriptions of faults.
 
 use super::{Fault, FaultKind, Slower};
 use crate::recording::ImuSamples;
@@ -21,7 +21,7 @@ pub fn notes(imu: &ImuSamples) -> Vec<String> {
         let done = if kind == FaultKind::Duplicate {
             "turncal dropped the duplicates.".to_owned()
         } else if unbridged == 0 {
-            "turncal interpolated there, and σ include the interpolation error.".to_owned()
+            "turncal interpolated there, and the σ include the interpolation error.".to_owned()
         } else {
             format!(
                 "{unbridged} of {} places are too long to bridge, so attitude and velocity restart there.",
@@ -46,16 +46,16 @@ pub fn notes(imu: &ImuSamples) -> Vec<String> {
 }
 
 impl ImuSamples {
-    /// A sentence on a part of a lower rate: its rate, and how it is handled.
+    /// A sentence on a part with a lower rate: its rate and its treatment.
     fn of_rate(&self, part: &Slower) -> String {
         let [from, to] = [part.samples.start, part.samples.end].map(|k| self.time(k));
         let [usual, step] = [1, part.step].map(|samples| 1e3 * self.period * samples as f64);
         let done = match part.places - part.bridged {
-            0 => "turncal interpolated the samples between, and σ include the interpolation error."
+            0 => "turncal interpolated the samples in between, and the σ include the interpolation error."
                 .to_owned(),
             unbridged => format!(
-                "turncal interpolated the samples between, but attitude and velocity restart at {unbridged} of {} \
-                 places, which loses dwells and moves. Split the log where its rate changes, and calibrate the parts \
+                "turncal interpolated the samples in between, but attitude and velocity restart at {unbridged} of {} \
+                 places, so dwells and moves are lost. Split the log where its rate changes, and calibrate the parts \
                  together as a campaign.",
                 part.places
             ),

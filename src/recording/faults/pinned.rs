@@ -1,8 +1,8 @@
-//! Axes pinned to a value while the instrument works: stuck within their range, or clipped at its end.
+//! Axes pinned to a value while the instrument is working: stuck within their range, or clipped at its end.
 //!
-//! A working axis repeats a value as long as its noise and its motion stay within a step of its grid. A run of equal
-//! values is a fault if it is improbable given the noise of the axis at rest, the level on either side, the motion that
-//! crosses the run or, at an end of the range, the motion on either side.
+//! A working axis repeats a value as long as its noise and motion remain within one step of its grid. A run of equal
+//! values is a fault if it is improbable. This is tested against the noise of the axis at rest, the level on either
+//! side, the motion that crosses the run and, at an end of the range, the motion on either side.
 
 mod ends;
 
@@ -23,22 +23,22 @@ const BLOCK: usize = 64;
 const STUCK_PART: f64 = 0.1;
 /// Number of rows whose sum is nearly free of rounding.
 const SUM: usize = 4;
-/// Number of rows next to a run whose mean is taken.
+/// Number of rows next to a run that are averaged.
 const NEXT: usize = 4 * SUM;
-/// Parts of the recording in which repeats of repeats are counted.
+/// Number of parts of the recording in which repeats of repeats are counted.
 const PARTS: usize = 32;
-/// Rows on either side of a run that show how a motion continues.
+/// Number of rows on either side of a run that show how a motion continues.
 const CLOSE: usize = 16;
 /// Median magnitude of second differences of white noise over its σ: √6 times that of a normal variate.
 const OF_SECOND_DIFFERENCES: f64 = 2.449_489_742_783_178 * 0.674_489_750_196_081_7;
 
-/// A column with the statistics by which it is judged.
+/// A column with the statistics for its tests.
 pub struct Axis<'a> {
     values: &'a [f64],
     facts: &'a ColumnFacts,
     /// Smallest difference of values; zero if they are all equal.
     step: f64,
-    /// Whether values are whole pulses, the remainder being carried into the next.
+    /// Whether values are whole pulses, with the remainder carried into the next value.
     pulses: bool,
     /// Runs of rows equal to the previous row.
     runs: Vec<Range<usize>>,
@@ -55,7 +55,7 @@ impl<'a> Axis<'a> {
         let is_free = |block: &&[f64]| !block.iter().any(|value| ends.contains(value));
         let blocks = values.chunks_exact(BLOCK);
         let free: Vec<f64> = blocks.filter(is_free).flatten().copied().collect();
-        // An axis of few values is at an extreme everywhere.
+        // An axis with few distinct values is at an extreme everywhere.
         let is_enough = free.len() as f64 > STUCK_PART * values.len() as f64;
         let free = if is_enough { &free } else { values };
         let axis = Self {
@@ -91,16 +91,15 @@ impl<'a> Axis<'a> {
         self.runs.iter().filter(is_stuck).cloned().collect()
     }
 
-    /// −ln of the largest probability that a sample repeats the one before, wherever the true value lies, with white
-    /// noise of this variance, steps².
+    /// −ln of the largest probability, for any true value, that a sample repeats the previous one, with white noise of
+    /// this variance, steps².
     ///
-    /// With the noise at rest, a value is most likely to stay within its step if the true value is in the
-    /// middle of it (Anderson's inequality). Correlated noise stays longer, which shows in the fraction of
-    /// repeated repeats.
+    /// With the noise at rest, a value is most likely to stay within its step if the true value is in the middle of it
+    /// (Anderson's inequality). Correlated noise stays longer; this is visible in the fraction of repeated repeats.
     fn nats(&self, variance: f64) -> f64 {
         let white = repeats_at_best(variance);
-        // Pulses count an angle that walks: it stays between two edges of a step with the largest
-        // eigenvalue of such a walk (Siegmund's correction of the edges: 0.5826 σ each).
+        // Pulses count an angle that performs a random walk. The probability that it stays between the two edges of a
+        // step is the largest eigenvalue of such a walk (Siegmund's correction of the edges: 0.5826 σ each).
         let walk = -0.5 * std::f64::consts::PI.powi(2) * variance
             / (1.0 + 1.1652 * variance.sqrt()).powi(2);
         let by_noise = if self.pulses && variance < 0.25 {
@@ -119,7 +118,7 @@ impl<'a> Axis<'a> {
             let (mean, slope, variance) = line(block);
             let level = (mean - origin) / self.step;
             let passed = 0.5 * (slope * BLOCK as f64 / self.step).abs();
-            // The middle between two steps is where values change between them most.
+            // Values change most between two steps if the true value is midway between them.
             let nearest = ((level - 0.5).round() + 0.5 - level).abs() - passed;
             let fraction = 0.5 - nearest.max(0.0);
             variance / self.step.powi(2) - self.of_grid().max(fraction * (1.0 - fraction))
@@ -144,8 +143,8 @@ impl<'a> Axis<'a> {
         }
     }
 
-    /// The same for the quieter side of these rows, because a motion may start or end on the other; zero at the start
-    /// and the end of the recording.
+    /// Variance of white noise on the quieter side of these rows, because a motion may start or end on the other side;
+    /// zero at the start and the end of the recording.
     fn unrest_beside(&self, rows: &Range<usize>) -> f64 {
         let Some(before) = rows.start.checked_sub(CLOSE) else {
             return 0.0;
@@ -162,7 +161,7 @@ impl<'a> Axis<'a> {
         if self.pulses { 1.0 / 6.0 } else { 1.0 / 12.0 }
     }
 
-    /// Whether both sides of a run stay on a level at which that many equal values are improbable.
+    /// Whether both sides of a run remain at a level at which that many equal values are improbable.
     ///
     /// The rate within the run may differ from the rate next to it by as much as the latter changes in the same time. A
     /// parabola `a t²` that only touches the value differs by 0.6 of that.
@@ -175,7 +174,8 @@ impl<'a> Axis<'a> {
         halves.any(|half| self.is_off_level(run, half, limit) == Some(true))
     }
 
-    /// The same statistic, with two halves of this many rows on either side.
+    /// Whether the value of a run differs from the level on both sides, with two halves of this many rows on either
+    /// side.
     fn is_off_level(&self, run: &Range<usize>, half: usize, limit: Limit) -> Option<bool> {
         let first = run.start - 1;
         let before = &self.values[first.checked_sub(2 * half)?..first];
@@ -191,25 +191,25 @@ impl<'a> Axis<'a> {
         let off = (value - 0.5 * (means[1] + means[2])).abs() / self.step;
         let (length, beside) = (run.len() as f64, half as f64);
         let least = 1.0 / length + 1.0 / beside;
-        // The value was sound when it came, so that it is one of the level's.
+        // The first of the equal values was correct, so it belongs to the level.
         let has = |side: &[f64]| {
             side.iter().any(|&other| other >= value) && side.iter().any(|&other| other <= value)
         };
         if off <= least || !has(halves[1]) || !has(halves[2]) {
             return Some(false);
         }
-        // Where a motion came to the value or left it, the rows next to the run are on their way.
+        // If a motion reached or left the value, the rows next to the run are part of that motion.
         let next = [&before[2 * half - NEXT..], &after[..NEXT]].map(mean);
         let all = || means.into_iter().chain(next);
         let spread = all().fold(f64::NEG_INFINITY, f64::max) - all().fold(f64::INFINITY, f64::min);
-        // Sums of pulses are right to a step, so that means may differ by as much without a change.
+        // Sums of pulses are accurate to one step, so means may differ by this amount without a change.
         let rounded = if self.pulses {
             1.0 / beside + 1.0 / NEXT as f64
         } else {
             0.0
         };
         let change = (spread / self.step - rounded).max(0.0);
-        // Rounding averages out in sums, which leaves noise and the rest of the motion.
+        // Rounding averages out in sums; noise and the rest of the motion remain.
         let sums = |side: &[f64]| {
             let sums = side.chunks_exact(SUM).map(|rows| rows.iter().sum());
             variance(&sums.collect::<Vec<f64>>())
@@ -246,7 +246,7 @@ impl<'a> Axis<'a> {
             let off = (mean - self.values[run.start] + forth * slope * apart) / self.step;
             let variance = (variance / self.step.powi(2)).max(self.of_grid());
             let spread = count.recip() + 12.0 * apart * apart / count.powi(3);
-            // Of the line carried on, and of the rows.
+            // Variances of the extrapolated line and of the rows.
             let variance = variance * length * (spread * length + 1.0);
             is_lost(length * off.abs(), variance, limit).then_some(off.signum())
         };
@@ -274,7 +274,7 @@ impl<'a> Axis<'a> {
             SVector::from([1.0, x, y, z])
         };
         let from = |from: usize| move |k| SVector::from(powers(k, from as f64));
-        // The last sample before the run is sound, too.
+        // The last sample before the run is also correct.
         let last = run.start - 1;
         let others = (before.start..last).chain(after.clone());
         let (factors, left_over) = fit(others, cubic, in_steps)?;
@@ -299,7 +299,7 @@ fn is_lost(lost: f64, variance: f64, limit: Limit) -> bool {
     lost > 2.0 + limit.sigmas * variance.sqrt()
 }
 
-/// Stretches of rows each equal to the one before.
+/// Stretches of rows that are each equal to the previous row.
 fn runs(column: &[f64]) -> Vec<Range<usize>> {
     let mut runs = Vec::new();
     let mut start = 1;

@@ -14,7 +14,7 @@ use crate::units::DEGREE;
 /// Longest hole that is bridged, s: a longer one may hide a whole move from dwell to dwell, without any sign at its
 /// edges.
 const LONGEST: f64 = 0.5;
-/// A hole is short compared with one this many times as long.
+/// A hole counts as short compared with a hole this many times as long.
 const SHORT: usize = 8;
 /// Largest attitude error that a linear filter can handle, rad.
 const WORST_ANGLE: f64 = 0.2 * DEGREE;
@@ -97,7 +97,7 @@ impl Rows<'_> {
         let mut filled = 0;
         let mut bridges = Vec::new();
         for (number, samples) in holes.iter().enumerate() {
-            // Beside a long hole short ones, once filled, are as good as sound.
+            // Next to a long hole, short holes that are filled count as good samples.
             while filled < number && SHORT * holes[filled].len() <= samples.len() {
                 sound[holes[filled].clone()].fill(true);
                 filled += 1;

@@ -15,7 +15,7 @@ pub struct Rows<'a> {
     pub facts: &'a [ColumnFacts; 6],
     /// Full scale of each column, in the file's quantity.
     pub full_scale: [Option<f64>; 6],
-    /// Whether rows are whole pulses, the remainder being carried into the next.
+    /// Whether rows are whole pulses, with the remainder carried into the next row.
     pub pulses: bool,
     /// The body axis of each column.
     pub body_axes: [usize; 6],
@@ -50,7 +50,7 @@ impl FaultyRows {
     }
 }
 
-/// Runs of rows or samples for which `is` is true.
+/// Runs of consecutive rows or samples for which `is` is true.
 pub fn ranges(count: usize, is: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
     consecutive((0..count).filter(|&row| is(row)))
 }

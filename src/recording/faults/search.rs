@@ -35,7 +35,7 @@ pub fn find(
         let stuck = axes[column].stuck(limit);
         let triad = [0, 1, 2].map(|axis| &axes[column - column % 3 + axis]);
         let saturated = saturated(triad, column % 3, full_scale[column], spikes, limit);
-        // The row before a run has its value.
+        // The row before a run has the same value.
         let free = |rows: &Range<usize>| {
             !saturated
                 .iter()
@@ -58,8 +58,8 @@ pub fn find(
     found.into_iter().flatten().collect()
 }
 
-/// Resolution, at its largest values, of a column of numbers with a fixed number of digits. It follows from the
-/// smallest change relative to the value; a last digit is up to ten times that.
+/// Resolution of a column of numbers with a fixed number of digits, at its largest values. It follows from the smallest
+/// change relative to the value; the last digit is up to ten times larger.
 fn last_digit(values: &[f64]) -> f64 {
     let changes = values.windows(2).filter(|pair| pair[0] != pair[1]);
     let relative = changes.map(|pair| (pair[1] - pair[0]).abs() / pair[0].abs().max(pair[1].abs()));

@@ -1,4 +1,4 @@
-//! Parts of a recording with a lower rate of rows: the same number of rows is missing at each place.
+//! Parts of a recording with a lower row rate: the same number of rows is missing at each place.
 
 use std::f64::consts::LN_2;
 use std::ops::Range;
@@ -7,10 +7,10 @@ use super::chance::Limit;
 use super::{Fault, FaultKind};
 use crate::recording::ImuSamples;
 
-/// A part of a recording with a lower rate of rows.
+/// A part of a recording with a lower row rate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Slower {
-    /// From the first sample without a row to the last.
+    /// The samples from the first one without a row to the last.
     pub samples: Range<usize>,
     /// Line of the row before these samples.
     pub line: u64,
@@ -23,7 +23,7 @@ pub struct Slower {
 }
 
 impl Slower {
-    /// Whether this fault is one of its places.
+    /// Whether this fault is one of the places of this part.
     pub fn holds(&self, fault: &Fault) -> bool {
         fault.kind == FaultKind::Missing && self.samples.contains(&fault.samples.start)
     }
@@ -92,7 +92,7 @@ mod tests {
         assert!(
             said[0].starts_with(
                 "From line 2001 (20.01 s) to 39.98 s the row interval is 30.000 ms instead of 10.000 ms: turncal \
-                 interpolated the samples between, but attitude and velocity restart at 499 of 666 places"
+                 interpolated the samples in between, but attitude and velocity restart at 499 of 666 places"
             ),
             "{said:?}"
         );

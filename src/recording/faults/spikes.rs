@@ -1,28 +1,29 @@
-//! Spikes: single samples that fit neither side.
+//! Spikes: single samples that match neither side.
 
 use rayon::prelude::*;
 
 use super::chance::Limit;
 use super::line::mean_and_slope;
 
-/// Numbers of samples of the lines that are extrapolated to the next sample: few follow a motion, many average noise.
+/// Numbers of samples for the lines that are extrapolated to the next sample: few samples follow a motion, many average
+/// noise.
 const LINES: [usize; 5] = [2, 4, 8, 16, 32];
 /// Number of samples on either side with which an extrapolated line is compared to measure its error.
 const TRIALS: usize = 64;
 /// Number of samples on either side from which the magnitude of second differences is taken.
 const AROUND: usize = 32;
-/// Fewest samples of a side that are used.
+/// Minimum number of samples used on one side.
 const FEWEST: usize = TRIALS / 4;
-/// Number of samples of a side that are examined.
+/// Number of samples examined on one side.
 const SIDE: usize = TRIALS + LINES[LINES.len() - 1];
 
 /// For each column, the rows that deviate from lines on both sides by more than in a faultless recording. `steps` are
 /// the smallest differences of values in the columns.
 ///
-/// A sample belongs to the motion if the line from before or from after fits it, or if it lies between the two: then a
-/// turn started or ended there. The error of a line is measured on the surrounding samples, and therefore includes
-/// noise, resolution and motion. The limit follows the tail of the second differences of the whole column. A knock is
-/// also motion: it lasts longer than one sample, or appears on other axes.
+/// A sample belongs to the motion if the line from before or from after fits it, or if the sample lies between the two
+/// lines: then a turn started or ended there. The error of a line is measured on the surrounding samples, and therefore
+/// includes noise, resolution and motion. The limit follows the tail of the second differences of the whole column. A
+/// knock is also motion: it lasts longer than one sample, or appears on other axes.
 pub fn spikes(columns: &[&[f64]; 6], steps: &[f64], limit: Limit) -> [Vec<usize>; 6] {
     if columns[0].len() < 2 * TRIALS {
         return [const { Vec::new() }; 6];
@@ -44,7 +45,7 @@ pub fn spikes(columns: &[&[f64]; 6], steps: &[f64], limit: Limit) -> [Vec<usize>
         let near = [row.saturating_sub(1), row, row + 1];
         bends.iter().enumerate().all(|(other, bent)| {
             let quiet = |row: &usize| bent.relative.get(*row).is_none_or(|r| *r <= bent.outer);
-            // The bends of a spike reach to the rows next to it.
+            // The second differences of a spike extend to the adjacent rows.
             let spiked = other == axis || spikes[other].binary_search(&row).is_ok();
             apart.iter().all(quiet) && (spiked || near.iter().all(quiet))
         })
@@ -74,7 +75,7 @@ impl Bends {
     fn of(column: &[f64], step: f64, limit: Limit) -> Self {
         let rows = column.len();
         let bend = |k: usize| (column[k] - 0.5 * (column[k - 1] + column[k + 1])).abs();
-        // Of rows before each.
+        // Number of rows before each.
         let mut sums = vec![0.0; 2];
         let mut sum = 0.0;
         for k in 1..rows - 1 {
@@ -85,11 +86,11 @@ impl Bends {
             Some(count) if count >= FEWEST => (sums[end] - sums[begin]) / count as f64,
             _ => 0.0,
         };
-        // σ of white noise over the mean magnitude, and of a second difference over that of its values.
+        // σ of white noise divided by the mean magnitude, and σ of a second difference divided by that of its values.
         let normal = (std::f64::consts::PI / 2.0).sqrt();
         let least = grid(step) * 1.5f64.sqrt();
         let relative = |k: usize| {
-            // The bends next to a spike are its own.
+            // The second differences next to a spike belong to the spike.
             let before = mean(
                 k.saturating_sub(AROUND + 1).max(1),
                 k.saturating_sub(1).max(1),
@@ -124,7 +125,8 @@ fn stands_out(column: &[f64], row: usize, grid: f64) -> f64 {
         };
         let low = before.next.min(after.next);
         let high = before.next.max(after.next);
-        // Motion that goes over from one slope to the other comes no nearer than half their difference.
+        // If the motion changes from one slope to the other, the distance is at least half of the difference of the
+        // slopes.
         let turned = 0.5 * (before.slope + after.slope).abs();
         let out = (value - high).max(low - value) - turned;
         let error = before.error.max(after.error);
@@ -149,7 +151,7 @@ const LEADS: f64 = 1.0;
 /// σ beyond which a tenth of normal variates lie, two-sided.
 const TENTH: f64 = 1.645;
 
-/// A line through the nearest samples of a side, which are in order of their distance.
+/// A line through the nearest samples of a side, given in order of their distance.
 struct Line {
     /// Value extrapolated to the sample before the nearest.
     next: f64,
@@ -168,15 +170,15 @@ impl Line {
         let (next, slope) = carried_on(&side[..points]);
         let error = |k: usize| (side[k] - carried_on(&side[k + 1..k + 1 + points]).0).abs();
         let mut errors: Vec<f64> = (0..trials).map(error).collect();
-        // Most errors on a coarse grid are none; a tenth may be of other spikes.
+        // On a coarse grid, most errors are zero; a tenth may be due to other spikes.
         let (_, error, _) = errors.select_nth_unstable_by(trials * 9 / 10, f64::total_cmp);
-        // On a grid it is uncertain by a step of it.
+        // On a grid, the value is uncertain by one step.
         let error = (*error / TENTH).hypot(grid);
         Some(Self { next, slope, error })
     }
 }
 
-/// Value, at the place before the first, of a line through these values, and its slope towards that place.
+/// Value of a line through these values at the position before the first, and its slope towards that position.
 fn carried_on(values: &[f64]) -> (f64, f64) {
     let (mean, slope) = mean_and_slope(values);
     (mean - slope * 0.5 * (values.len() as f64 + 1.0), -slope)

@@ -13,7 +13,7 @@ use nalgebra::Vector3;
 const FRAME: usize = 256;
 /// Differences of orders below this are tried.
 const ORDERS: usize = 3;
-/// Number of bytes that can be read at once behind the last bit.
+/// Number of bytes that can be read at once beyond the last bit.
 const PADDING: usize = 16;
 
 /// Samples of three axes, packed.
@@ -61,7 +61,7 @@ impl Packed {
     }
 }
 
-/// Packs samples of three axes one by one.
+/// Packer for samples of three axes, one by one.
 #[derive(Debug)]
 pub struct Packer {
     /// Step of each axis, in the input quantity.
@@ -136,9 +136,9 @@ const AT_REST: f64 = 0.1;
 /// Steps per σ of the noise: packing adds at most a fortieth to the variance of a sample, and at most half a step
 /// to a sum over samples.
 const STEPS_OF_NOISE: f64 = 4.0;
-/// Packing steps per step of the values' grid.
+/// Number of packing steps per step of the grid of the values.
 const STEPS_OF_GRID: f64 = 16.0;
-/// Steps up to the largest value, if no noise is found.
+/// Number of steps up to the largest value, if no noise is found.
 const STEPS_OF_RANGE: f64 = 4_294_967_296.0;
 
 /// Largest step for an axis with these values such that the packing error is negligible against its noise.

@@ -18,7 +18,7 @@ const SHORTER_WAY: f64 = 1.0;
 
 /// A move from one dwell to the next.
 struct Move {
-    /// Total angle according to the gyros and to the table, both senses of rotation counted, rad.
+    /// Total angle according to the gyros and to the table, counting both senses of rotation, rad.
     gyros: f64,
     table: f64,
     /// Mean time according to the table, and delay of the gyros, s.
@@ -26,7 +26,7 @@ struct Move {
     late: f64,
     /// Tolerance for the difference of the two angles of one move, rad.
     tolerance: f64,
-    /// Difference that the uncertainty of the bias from dwells causes, rad.
+    /// Difference caused by the uncertainty of the bias from dwells, rad.
     zero: f64,
     /// The longest time between two readings, s.
     interval: f64,
@@ -127,10 +127,10 @@ fn other_times(moves: &[Move], resolved: f64, period: f64) -> Option<String> {
     ))
 }
 
-/// A gyro scale factor that contradicts all moves together: their angles differ from the table's in the same ratio.
-/// Methods that do not use turns would not notice it.
+/// A gyro scale factor that contradicts all moves together: their angles differ from those of the table in the same
+/// ratio. Methods that do not use turns would not notice it.
 fn scale(run: &Run, moves: &[Move]) -> Option<String> {
-    // The first and the last may be cut by the end of a log.
+    // The first and the last move may be cut off by the end of a log.
     let moves = moves.get(1..moves.len().saturating_sub(1))?;
     let sum = |of: fn(&Move) -> f64| moves.iter().map(of).sum::<f64>();
     let (gyros, table) = (sum(|m| m.gyros), sum(|m| m.table));
@@ -148,8 +148,8 @@ fn scale(run: &Run, moves: &[Move]) -> Option<String> {
     })
 }
 
-/// Median over the table's dwells of the mean gyro rates: the biases plus a part of Earth rate, and their
-/// uncertainty, rad/s. The prior's biases may be wrong; dwells are placed by the table's clock, which may be off.
+/// Median over the table's dwells of the mean gyro rates: the biases plus a part of Earth rate, and their uncertainty,
+/// rad/s. The prior biases may be wrong, and the dwells are timed by the table clock, which may be off.
 fn bias_at_rest(run: &Run, stands: &[Dwell]) -> (Vector3<f64>, f64) {
     let prior = &run.instrument.prior.gyro;
     let known = stands
@@ -163,13 +163,13 @@ fn bias_at_rest(run: &Run, stands: &[Dwell]) -> (Vector3<f64>, f64) {
     (bias, SIGMAS * sigma.min(prior.bias_sigma.norm()))
 }
 
-/// Moves that both logs resolve, each from the middle of one standstill of the table to the middle of the next, and
-/// the spans before the first and after the last that both logs cover. Two moves taken as one would have a time error
-/// if the scale factors of their axes differ.
+/// Moves that both logs resolve, each from the middle of one standstill of the table to the middle of the next, and the
+/// spans before the first and after the last that both logs cover. Two moves treated as one would have a time error if
+/// the scale factors of their axes differ.
 fn moves(run: &Run, table: &TableLog) -> Vec<Move> {
     let imu = &run.recording.imu;
     let stands = standstills(run, table);
-    // One alone does not tell how far off the bias is that it shows.
+    // A single dwell does not show how wrong its bias is.
     let ([_, _, ..], [first, .., last]) = (&stands[..], &table.time[..]) else {
         return Vec::new();
     };
@@ -185,7 +185,8 @@ fn moves(run: &Run, table: &TableLog) -> Vec<Move> {
     moves.collect()
 }
 
-/// The move over these samples according to both logs; `None` if readings are too far apart, or nothing turns.
+/// The move over these samples according to both logs; `None` if readings are too far apart, or if there is no
+/// rotation.
 fn of_samples(
     run: &Run,
     table: &TableLog,
@@ -204,16 +205,16 @@ fn of_samples(
         let angle = attitude[1].angle_to(&attitude[0]);
         (time[0].midpoint(time[1]), time[1] - time[0], angle)
     });
-    // Two readings of three components each, as where standstills are found.
+    // Two readings of three components each, as in the search for standstills.
     let noise = SIGMAS * run.table.reading_sigma * 6f64.sqrt();
     let [by_table, time, table_rate] = way(steps, noise, 0.0);
-    // A move that the end of a log cuts is seen as far as both logs go.
+    // A move cut off by the end of a log is observed as far as both logs extend.
     let covered = |time: f64| (imu.edge(time).max(0.0) as usize).clamp(samples.start, samples.end);
     let steps = turning::steps(imu, covered(first)..covered(last), bias);
     let steps = steps.map(|(time, duration, turned)| (time, duration, turned.norm()));
     let noise = SIGMAS * run.instrument.noise.gyro.random_walk * (3.0 * STEP).sqrt()
         + 3f64.sqrt() * imu.pulse.gyro;
-    // A bias from dwells has Earth rate in it, too.
+    // A bias from dwells also contains Earth rate.
     let zero = SIGMAS * run.instrument.prior.gyro.bias_sigma.norm() + 2.0 * ROTATION_RATE;
     let [by_gyros, time_by_gyros, gyro_rate] = way(steps, noise, zero);
     let is_resolved = gyro_rate.max(table_rate) * interval < SHORTER_WAY;

@@ -36,7 +36,7 @@ pub fn dead(run: &Run) -> Option<String> {
     let axes = listed(run, |sensor, rows| {
         let sigma = run.instrument.noise.get(sensor).random_walk * imu.period.sqrt();
         let changes = smallest_changes(rows);
-        // Noise leaves a step by chance in each row anew, most seldom where the truth is in the middle of it.
+        // In each row, noise may leave a step by chance, most rarely if the true value is in the middle of the step.
         let stays = erf(changes.min() / (8f64.sqrt() * sigma)).ln() * rows.len() as f64;
         let is_beyond_chance = stays < (FALSE_ALARM / 6.0).ln();
         let axes = (0..AXES.len()).filter(|&axis| is_beyond_chance && changes[axis].is_infinite());

@@ -1,4 +1,4 @@
-//! Checks of a run on input, which report unusual but possible facts.
+//! Checks of a run on input. They report unusual but possible facts.
 
 mod clock;
 mod columns;
@@ -12,7 +12,7 @@ use crate::statistics::{FALSE_ALARM, chi_square_limit};
 use crate::units::{DEGREE, MILLIGAL};
 
 impl Run {
-    /// The reports of all checks, a few sentences each, in the order in which the reader shows them.
+    /// The reports of all checks, a few sentences each, in display order.
     pub fn doubts(&self) -> Vec<String> {
         let checks: [fn(&Self) -> Option<String>; 5] = [
             gravity,
@@ -52,8 +52,8 @@ fn gravity(run: &Run) -> Option<String> {
     })
 }
 
-/// Reports a table log that starts after the IMU's, or ends before it, by more than its longest pause. Outside it,
-/// the table may have moved unobserved.
+/// Reports a table log that starts after the IMU log, or ends before it, by more than its longest pause. Outside the
+/// table log, the table may have moved unobserved.
 fn coverage(run: &Run) -> Option<String> {
     let table = run.recording.table.as_ref()?;
     let (first, last) = (*table.time.first()?, *table.time.last()?);

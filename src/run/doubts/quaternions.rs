@@ -15,9 +15,9 @@ type Reading = fn(&Matrix3<f64>) -> Matrix3<f64>;
 /// if they rotate East-North-Up to the body.
 ///
 /// Specific force at rest points up, except for errors within the prior σ. The likelihood ratio of two hypotheses
-/// follows from their sums of squared residuals, with the variance estimated from each sum. For the stated order,
-/// the best of all 48 axis orders of the accelerometers is used, because these are also only stated, and another
-/// check tests them.
+/// follows from their sums of squared residuals, with the variance estimated from each sum. For the stated order, the
+/// best of all 48 axis orders of the accelerometers is used, because that order is also only stated and is tested by
+/// another check.
 pub fn order(run: &Run) -> Option<String> {
     let table = run.recording.table.as_ref()?;
     if !table.axes.is_empty() {

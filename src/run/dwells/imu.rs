@@ -19,19 +19,20 @@ use crate::units::DEG_PER_H;
 const WINDOW: f64 = 0.25;
 /// Minimum length of a standstill in windows, because a released sensor still swings.
 const FEWEST: usize = 4;
-/// A standstill of this many seconds between two moves is always found. Its ends cut up to one window in all; at each
-/// end, the next window differs from its neighbour, and the one after is dropped because it may be a gentle move.
+/// A standstill of this many seconds between two moves is always found. At its ends, up to one window in total is lost;
+/// at each end, the next window differs from its neighbour, and the one after that is dropped because it may be a
+/// gentle move.
 pub const LONG_ENOUGH: f64 = (1 + 2 * 2 + FEWEST) as f64 * WINDOW;
 /// Output at rest varies by less than this many σ of its noise, plus a rate and a force.
 pub const STILL_SIGMAS: f64 = 6.0;
-/// The rate: drift of the worst bias within seconds, rad/s.
+/// Rate, rad/s: drift of the worst bias within seconds.
 pub const STILL_RATE: f64 = 100.0 * DEG_PER_H;
-/// The force, m/s²: a turn of 0.02°.
+/// Force, m/s²: that of a turn by 0.02°.
 const STILL_FORCE: f64 = 3e-3;
 /// False-alarm rate of the test that ends a standstill at a window that differs from its neighbours: an axis
 /// has started to turn, or still settles. A false alarm costs a window.
 const SETTLED: f64 = 0.01;
-/// Number of windows one after the other that it is compared with.
+/// Number of successive windows with which it is compared.
 const BESIDE: usize = 2 * FEWEST;
 /// During warm-up, a bias changes by less than [`STILL_RATE`] in this time, s.
 const WARMING: f64 = 20.0;
@@ -59,12 +60,12 @@ struct Windows {
 impl Slide {
     fn of(imu: &ImuSamples) -> Self {
         let length = samples_of(WINDOW, imu.period);
-        // The means of a packed recording would take the memory that packing saves.
+        // Storing the means of a packed recording would need the memory that packing saves.
         let step = if imu.is_packed() { length } else { 1 };
         Self { length, step }
     }
 
-    /// Windows from one to the next that has no samples in common with it.
+    /// Number of windows to the next one without common samples.
     fn apart(self) -> usize {
         self.length / self.step
     }
@@ -94,8 +95,8 @@ impl Windows {
             let windows = slide.with(&missing, means.len());
             means[windows].fill(Vector3::repeat(f64::NAN));
         }
-        // Most windows are at rest or turn evenly, so the median sees noise alone; noise figures may
-        // know nothing of a laboratory's shaking.
+        // Most windows are at rest or turn evenly, so the median contains only noise; the noise figures may not include
+        // vibration in the laboratory.
         let pairs = means.iter().zip(means.iter().skip(slide.apart()));
         let changes = pairs.map(|(one, next)| (next - one).abs());
         let known = changes.filter(|change| !change.x.is_nan());
@@ -142,7 +143,7 @@ impl Windows {
         still
     }
 
-    /// The samples of a standstill, which consists of these windows, without those at its ends that differ from their
+    /// The samples of a standstill that consists of these windows, without windows at its ends that differ from their
     /// neighbours.
     fn settled(&self, windows: Range<usize>) -> Range<usize> {
         let Slide { length, step } = self.slide;
@@ -174,7 +175,7 @@ pub fn standstills(run: &Run) -> Vec<Range<usize>> {
     let [gyro, accel] = Sensor::ALL.map(|sensor| Windows::of(run, sensor, slide));
     let rate = STILL_SIGMAS * gyro.sigma + STILL_RATE;
     let force = STILL_SIGMAS * SQRT_2 * accel.sigma + STILL_FORCE;
-    // A window beyond the recording, or what is known of it, does not tell.
+    // A window beyond the recording, or beyond its known part, gives no information.
     let steady = |k: usize, beside: usize| {
         let beside = accel.means.get(beside);
         beside.is_none_or(|beside| beside.x.is_nan() || (accel.means[k] - beside).norm() < force)
@@ -185,7 +186,7 @@ pub fn standstills(run: &Run) -> Vec<Range<usize>> {
     let still = ranges(gyro.means.len(), |k| still[k]).into_iter();
     let standstills = still.filter_map(|still| {
         let Range { mut start, mut end } = gyro.settled(still);
-        // A move begins and ends too gently for the windows at its ends to show it.
+        // A move begins and ends too gently to be visible in the windows at its ends.
         let is_known = |sample: usize| !imu.is_lost(&(sample..sample + 1));
         if start.checked_sub(1).is_some_and(is_known) {
             start += slide.length;

@@ -14,15 +14,15 @@ use crate::recording::{LabelledMotion, Segment};
 use crate::units::DEGREE;
 use imu::{STILL_RATE, STILL_SIGMAS};
 
-/// Integrals of the gyros below this, beyond their noise and the drift of their bias, are not a turn, rad.
+/// Gyro integrals below this, beyond noise and bias drift, are not a turn, rad.
 const STILL_ANGLE: f64 = 0.1 * DEGREE;
 
 impl Run {
     /// The dwells, in order.
     ///
-    /// The gyros check the standstills of a table's log. A standstill during which they turn is not a dwell (two
-    /// readings may miss a full turn). Two standstills without a turn in between are merged (a wild reading or a
-    /// knock separated them).
+    /// The standstills of a table log are checked against the gyros. A standstill during which they turn is not a dwell
+    /// (two readings may miss a full turn). Two standstills without a turn in between are merged (they were separated
+    /// by a wild reading or a knock).
     pub fn dwells(&self, aiding: Aiding) -> Vec<Dwell> {
         let imu = &self.recording.imu;
         if !imu.continuous && !self.recording.segments.is_empty() {
@@ -45,7 +45,7 @@ impl Run {
         }
         dwells.retain_mut(|dwell| {
             for missing in imu.missing() {
-                // The longer part before or after it.
+                // The longer of the parts before and after it.
                 let known = [missing.end..imu.len(), 0..missing.start];
                 let parts = known.map(|known| common(&known, &dwell.samples));
                 let longer = parts.into_iter().max_by_key(Range::len);

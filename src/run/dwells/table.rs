@@ -19,7 +19,7 @@ const MARGIN: f64 = 0.2;
 const CREEP_STRETCH: f64 = 1.0;
 /// Number of σ by which this mean reveals creep.
 const CREEP_SIGMAS: f64 = 5.0;
-/// Least time between readings that are compared to distinguish a slow turn from a standstill in a dense log, s.
+/// Minimum time between readings that are compared to distinguish a slow turn from a standstill in a dense log, s.
 const APART: f64 = 0.05;
 
 /// Limit for the difference of two means of readings whose variances add up to `share` times that of a reading.
@@ -27,7 +27,7 @@ fn limit(run: &Run, share: f64) -> f64 {
     STANDING_ANGLE.max(STANDING_SIGMAS * run.table.reading_sigma * share.sqrt())
 }
 
-/// Whether two dwells are at one position according to the readings.
+/// Whether two dwells are at the same position according to the readings.
 pub fn same_reading(run: &Run, before: &Position, after: &Position) -> bool {
     let share = 1.0 / before.readings.len() as f64 + 1.0 / after.readings.len() as f64;
     log(&(after.attitude * before.attitude.transpose())).norm() < limit(run, share)
@@ -57,13 +57,13 @@ pub fn standstills(run: &Run, table: &TableLog) -> Vec<Dwell> {
 
 fn dwell(run: &Run, table: &TableLog, standing: Range<usize>) -> Option<Dwell> {
     let settled = settled(table, run.table.reading_sigma, standing);
-    // At either end of the log the table is not known to move.
+    // At either end of the log, it is not known whether the table moves.
     let margin = |at_end: bool| if at_end { 0.0 } else { MARGIN };
     let begin = table.time[settled.start] + margin(settled.start == 0);
     let end = table.time[settled.end - 1] - margin(settled.end == table.time.len());
     let readings = table.time.partition_point(|&time| time < begin)
         ..table.time.partition_point(|&time| time <= end);
-    // A stamp that misses a sample's edge by rounding must not cost the sample.
+    // If a stamp misses the edge of a sample by rounding, the sample must not be lost.
     let imu = &run.recording.imu;
     let sample = |edge: f64| edge.clamp(0.0, imu.len() as f64) as usize;
     let first = sample((imu.edge(begin) - 1e-3).ceil());

@@ -108,13 +108,13 @@ struct Record<'a> {
     standstills: Vec<Range<usize>>,
 }
 
-/// Verdict, disagreement and samples as labelled of a [`LabelCheck`].
+/// Verdict, disagreement and matching samples of a [`LabelCheck`].
 type Checked = (Verdict, Option<String>, Option<Range<usize>>);
 
 impl Record<'_> {
     /// A section that is labelled as a position.
     fn position(&self, segment: &Segment, up: &Vector3<f64>) -> Checked {
-        // Samples of it in which it stands, where it turns in the others.
+        // The samples of the section at rest, if the instrument turns in the other samples.
         let standing = self.run.standing_in(&segment.samples, &self.standstills);
         let turns = standing.is_some();
         let section = Dwell::of(standing.unwrap_or_else(|| segment.samples.clone()));
@@ -151,7 +151,7 @@ impl Record<'_> {
         let length = samples_of(END, imu.period).min(samples.len());
         let (first, last) = (samples.start + length, samples.end - length);
         let turns = |end: Range<usize>| angle(&end).norm() / length as f64 / imu.period > TURNING;
-        // Beyond sections laid end to end lies something else.
+        // Outside concatenated sections, the data belong to something else.
         let whole = if imu.continuous {
             self.to_rests(&samples)
         } else {
@@ -186,7 +186,7 @@ impl Record<'_> {
             ..after.map_or(samples.end, |dwell| dwell.start.max(samples.end))
     }
 
-    /// Time of some samples outside all dwells, s. In a recording of sections, dwells follow from labels.
+    /// Time of some samples outside all dwells, s. In a recording of sections, the dwells are derived from labels.
     fn moving(&self, samples: &Range<usize>) -> f64 {
         let dwells = self.rests.iter().map(|rest| &rest.dwell.samples);
         let standing: usize = dwells.map(|dwell| common(dwell, samples).len()).sum();

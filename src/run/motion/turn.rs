@@ -12,11 +12,11 @@ use crate::run::Run;
 use crate::run::turning::{SMALLEST, steps};
 use crate::units::DEGREE;
 
-/// A turn counts as single-axis if the integrals of the rates reach this part of the total angle.
+/// A turn counts as single-axis if the integrals of the rates reach this fraction of the total angle.
 const ALONG: f64 = 0.95;
 /// The rotation must also agree with the single rotation by these integrals within this angle, rad.
 const ONE_AXIS: f64 = 1.0 * DEGREE;
-/// Part of the total angle that is added to this tolerance.
+/// Fraction of the total angle that is added to this tolerance.
 const APART: f64 = 0.02;
 /// A turn about an axis within this angle of a body axis is assigned to that body axis.
 const NEAR_AXIS: f64 = 15.0 * DEGREE;
@@ -103,7 +103,7 @@ pub fn zero(run: &Run, rests: &[Rest], sample: usize) -> Vector3<f64> {
 pub fn turns(run: &Run, rests: &[Rest]) -> Vec<Turn> {
     let imu = &run.recording.imu;
     let turn = |samples: Range<usize>| {
-        // What was lost on the way may be any turn.
+        // Lost samples may contain any turn.
         let known = !samples.is_empty() && !imu.is_lost(&samples);
         let zero = zero(run, rests, samples.start);
         let turn = known.then(|| Turn::of(run, samples, &zero));

@@ -22,8 +22,8 @@ pub struct Baseline {
     pub table_time: f64,
     /// Total time of the dwells in the run, s.
     standing: f64,
-    /// Part of each dwell for which the table time equals that of the filter; one if the filter takes more
-    /// than the whole run, `None` if it takes less than the moves between the positions.
+    /// Fraction of each dwell for which the table time equals that of the filter; one if the filter needs more than the
+    /// whole run, `None` if it needs less than the moves between the positions.
     equal: Option<f64>,
 }
 

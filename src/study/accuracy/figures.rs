@@ -15,15 +15,15 @@ pub struct Figures {
     pub claimed: f64,
     /// RMS of the Bayesian Cramér–Rao bound.
     pub bound: f64,
-    /// Filter over bound.
+    /// RMS error of the filter divided by the bound.
     pub ratio: Option<Ratio>,
     /// RMS error of the closed form in its own time.
     pub closed_form: Option<f64>,
-    /// Closed form in its own time over filter.
+    /// RMS error of the closed form in its own time, divided by that of the filter.
     pub gain: Option<Ratio>,
-    /// RMS error of the closed form in the filter's time; `None` if that is too short.
+    /// RMS error of the closed form in the table time of the filter; `None` if that is too short.
     pub closed_form_in_equal_time: Option<f64>,
-    /// Closed form in the filter's time over filter.
+    /// RMS error of the closed form in the table time of the filter, divided by that of the filter.
     pub gain_in_equal_time: Option<Ratio>,
 }
 
@@ -44,7 +44,7 @@ impl Figures {
             runs.iter().filter_map(one).collect()
         };
         let some = |squares: Vec<f64>| (!squares.is_empty()).then(|| rms(&squares));
-        // A ratio uses only runs that have both.
+        // A ratio uses only runs that have both errors.
         let ratio = |over: &dyn Fn(&Squares) -> Option<f64>,
                      under: &dyn Fn(&Squares) -> Option<f64>| {
             let both = runs.iter().filter_map(|s| over(s).zip(under(s)));
@@ -115,7 +115,7 @@ pub fn of_error_terms(trials: &[Trial]) -> Vec<(ErrorTerm, Figures)> {
     ErrorTerm::ALL.into_iter().filter_map(of_term).collect()
 }
 
-/// Over the entries at some indices.
+/// Mean squares over the entries at some indices.
 fn mean_square(of: &[f64], indices: &[usize]) -> f64 {
     indices.iter().map(|&k| of[k].powi(2)).sum::<f64>() / indices.len() as f64
 }

@@ -1,5 +1,5 @@
-//! Navigation accuracy of the calibrations: position errors after 40 h of navigation (as in the paper) from perfect
-//! alignment, compared with the σ predicted from the filter covariance.
+//! Navigation accuracy of the calibrations: position errors after 40 h of navigation from perfect alignment (as in the
+//! paper), compared with the σ predicted from the filter covariance.
 
 use nalgebra::{Matrix2, SMatrix, Vector2};
 use statrs::distribution::{Binomial, DiscreteCDF};
@@ -86,7 +86,7 @@ pub struct Way {
 }
 
 impl Journey {
-    /// All, in the order of every result.
+    /// All journeys, in the order in which results list them.
     pub const ALL: [Self; 2] = [Self::Standing, Self::Flight];
 
     fn mission(self, scenario: &Scenario) -> Result<Mission, ModelError> {
@@ -173,7 +173,7 @@ fn whitened(error: &Vector2<f64>, covariance: &Matrix2<f64>) -> Option<Vector2<f
 }
 
 impl Region {
-    /// All, in the order of every result.
+    /// All regions, in the order in which results list them.
     pub const ALL: [Self; 4] = [
         Self::East,
         Self::North,
@@ -216,7 +216,7 @@ impl Containment {
         })
     }
 
-    /// Whether the number within lies inside its interval.
+    /// Whether the number of runs within the region is inside its interval.
     pub fn as_claimed(&self) -> bool {
         (self.interval.0..=self.interval.1).contains(&self.within)
     }

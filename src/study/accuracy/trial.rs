@@ -14,7 +14,7 @@ use crate::run::Aiding;
 use crate::simulation::Runs;
 use crate::study::StudyError;
 
-/// One run. Errors are estimate minus truth; everything is in the general form.
+/// A run of the study. Errors are estimate minus truth; everything is in the general form.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Trial {
     /// Number, the stream of its random numbers.
@@ -78,7 +78,7 @@ impl AccuracyStudy {
             .installation(self.form)
             .aiding(aiding)
             .noise(self.noise);
-        // Terms that are left unmodelled on purpose must not be switched on automatically.
+        // Terms that are deliberately left unmodelled must not be switched on automatically.
         options.auto_terms = self.auto_terms && self.unmodelled.is_empty();
         let mut problem = Problem::new(&record, &options);
         let form = self.bound_form(&truth);
@@ -112,7 +112,7 @@ impl AccuracyStudy {
         })
     }
 
-    /// The filter's form if it can represent the truth, else the general form, for the bound.
+    /// Form for the bound: that of the filter if it can represent the truth, otherwise the general form.
     fn bound_form(&self, truth: &PerSensor<Triad>) -> InstallationForm {
         if self.form.holds(truth.gyro.form) {
             self.form

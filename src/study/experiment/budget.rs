@@ -5,13 +5,13 @@ use nalgebra::SMatrix;
 use super::method::Calibrated;
 use crate::calibration::{Group, PARAMETERS, ParameterMatrix};
 
-/// Horizontal position error, east and north in nmile, by parameter errors.
+/// Horizontal position error, east and north in nmile, per parameter error.
 pub(super) type ByParameter = SMatrix<f64, 2, PARAMETERS>;
 
 /// Budget of the final position error from the stated covariance, averaged over all instruments.
 ///
-/// Errors of groups are correlated: the filter knows many sums better than their terms. A group's
-/// share is the covariance of its contribution with the total, over the variance of the total,
+/// Errors of groups are correlated: the filter determines many sums better than their terms. A group's share is the
+/// covariance of its contribution with the total, over the variance of the total,
 ///
 /// ```text
 /// share_g = tr(S_g P_g· Sᵀ) / tr(S P Sᵀ)
@@ -23,11 +23,11 @@ pub(super) type ByParameter = SMatrix<f64, 2, PARAMETERS>;
 pub struct Budget {
     /// Stated RMS position error, nmile.
     pub claimed: f64,
-    /// The part of each of [`Group::all`].
+    /// The contribution of each of [`Group::all`].
     pub parts: Vec<Part>,
 }
 
-/// The part of one group.
+/// The contribution of one group.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Part {
     /// The group.

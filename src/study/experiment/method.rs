@@ -41,12 +41,12 @@ pub struct Method {
 }
 
 impl Estimator {
-    /// All, in the order of every result.
+    /// All estimators, in the order in which results list them.
     pub const ALL: [Self; 3] = [Self::ClosedForm, Self::Filter, Self::LongFilter];
 }
 
 impl Method {
-    /// All, in the order of every result.
+    /// All methods, in the order in which results list them.
     pub fn all() -> impl Iterator<Item = Self> {
         Estimator::ALL
             .into_iter()
@@ -138,7 +138,7 @@ fn calibrated(
             rejects_form,
         }
     };
-    // The noise that a scenario states is correct.
+    // The noise stated in a scenario is correct.
     let options = Options::default().noise(NoisePolicy::Stated);
     let problem = Problem::new(run, &options.installation(form));
     match estimator {

@@ -1,5 +1,5 @@
-//! Effect of the instrument's noise during alignment and navigation. The effect is the same after every calibration and
-//! therefore treated separately.
+//! Effect of instrument noise during alignment and navigation. It is the same after every calibration and is therefore
+//! treated separately.
 
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 use rand::{RngExt, SeedableRng};

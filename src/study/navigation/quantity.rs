@@ -20,7 +20,7 @@ pub struct Quantity {
     pub key: &'static str,
     /// Index in [`Outlook::sigma`]; for a horizontal length, that of its first component.
     place: usize,
-    /// Whether the quantity has a sign, and a normal distribution where parameters have one.
+    /// Whether the quantity has a sign, and a normal distribution if the parameters have one.
     pub is_component: bool,
     units: Units,
 }
@@ -70,8 +70,8 @@ impl Quantity {
         self.units[0].1
     }
 
-    /// A unit in which values up to this one have few zeros, and its size in the usual unit, in which `largest` is
-    /// given.
+    /// A unit in which values up to `largest` (in the usual unit) have few zeros, and the factor that converts from the
+    /// usual unit to it.
     pub fn readable_unit(self, largest: f64) -> (&'static str, f64) {
         let (unit, value) = readable(self.units, largest * self.unit_value());
         (unit, self.unit_value() / value)

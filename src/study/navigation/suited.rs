@@ -17,7 +17,7 @@ const DURATIONS: [f64; 17] = [
     1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1200.0, 1800.0, 3600.0, 7200.0,
     14_400.0, 36_000.0, 144_000.0,
 ];
-/// Fewest moments of a curve.
+/// Minimum number of moments of a curve.
 const MOMENTS: f64 = 20.0;
 
 impl Mission {
@@ -56,7 +56,7 @@ impl Mission {
                 attitude <= SMALL && position <= NEAR * SEMI_MAJOR_AXIS
             })
         };
-        // A poor one needs no forty hours to be found poor.
+        // A poor calibration shows its errors in much less than forty hours.
         let mut useful = DURATIONS[0];
         for longest in [60.0, 3600.0, DURATIONS[DURATIONS.len() - 1]] {
             let outlook = Self::lasting(site, longest).outlook(estimate, None)?;

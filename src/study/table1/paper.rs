@@ -6,7 +6,7 @@ use super::quantity::{ByQuantity, Moments};
 use crate::calibration::{Position, six_position_triad};
 use crate::imu::{InstallationForm, Sensor, Triad};
 
-/// Samples behind each figure of the table.
+/// Number of samples behind each figure of the table.
 pub const SAMPLES: usize = 50;
 /// Length of the runs, h.
 pub const HOURS: f64 = 40.0;
@@ -25,7 +25,7 @@ pub struct Published {
     pub figures: [u8; 2],
     mean: ByQuantity<f64>,
     std: ByQuantity<f64>,
-    /// The reading that the paper states.
+    /// The reading stated in the paper.
     pub stated: Reading,
     /// Other readings.
     pub others: &'static [Reading],

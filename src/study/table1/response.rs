@@ -9,8 +9,8 @@ use crate::imu::{InstallationForm, PARAMETERS as PER_TRIAD, PerSensor, Sensor, T
 use crate::navigation::error_model::STATES;
 use crate::study::navigation::{Exposure, Mission, NavigationStudyError};
 
-/// Longest output step in s. The largest of a Schuler swing of 84 min lies within half a step of an
-/// output, and is at most 1.7e-4 above it.
+/// Longest output step in s. The peak of a Schuler oscillation of 84 min is within half a step of an output, and at
+/// most 1.7e-4 above the output.
 const STEP: f64 = 30.0;
 
 /// A body at rest on the ellipsoid, level and heading north, for a time in s.
@@ -61,7 +61,7 @@ impl Response {
         largest
     }
 
-    /// About this many moments, evenly spaced from the first on.
+    /// Selects about this many moments, evenly spaced from the first on.
     pub fn thinned(&self, moments: usize) -> impl Iterator<Item = &Moment> {
         self.0.iter().step_by(self.0.len().div_ceil(moments.max(1)))
     }

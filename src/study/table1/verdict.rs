@@ -6,8 +6,8 @@ use super::quantity::{ByQuantity, Moments};
 /// Two means agree if they differ by no more than this many standard errors of their difference: 99 %
 /// of the normal distribution.
 pub const AGREEMENT: f64 = 2.576;
-/// A figure that should be zero counts as rounding if it is below this part of the same figure of the
-/// three-angle form.
+/// A figure that should be zero counts as rounding if it is below this fraction of the same figure of the three-angle
+/// form.
 const ROUNDING: f64 = 1e-6;
 
 /// Verdict on one of the paper's four columns.
@@ -19,8 +19,8 @@ pub enum Verdict {
     Zero,
     /// All five means agree under another reading that a correct program may implement.
     UnderAnotherReading(&'static Reading),
-    /// The figures agree under no reading of a correct program; contains the mistake under which they agree, if one is
-    /// known.
+    /// The figures do not agree under any reading that a correct program may implement; contains the mistake that
+    /// reproduces them, if known.
     NotReproducible(Option<&'static Reading>),
 }
 

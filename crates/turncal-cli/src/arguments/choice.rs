@@ -7,7 +7,7 @@ use turncal::imu::InstallationForm;
 use turncal::run::Aiding;
 use turncal_files::export::{FORMATS, Format};
 
-/// A name on the command line, what it stands for in words, and its value.
+/// A name on the command line, its description and its value.
 type Choice<T> = (&'static str, &'static str, T);
 
 /// Methods of estimation.
@@ -24,7 +24,7 @@ pub const METHODS: [Choice<Method>; 2] = [
     ),
 ];
 
-/// Parameters that --require may name: all, or those whose names begin in this way.
+/// Parameters that --require accepts: all, or those whose names begin with this prefix.
 pub const REQUIRED: [Choice<&str>; 9] = [
     ("all", "Every parameter that is estimated", ""),
     ("gyro", "All of the gyros", "gyro."),
@@ -74,11 +74,11 @@ pub const AIDINGS: [Choice<Aiding>; 2] = [
     ),
 ];
 
-/// Policies for the noise of the filter. A name without words is not listed.
+/// Policies for the noise of the filter. A name without a description is not listed.
 pub const NOISE: [Choice<NoisePolicy>; 4] = [
     (
         "stated",
-        "Use the noise that run.toml and models state",
+        "Use the noise stated in run.toml and models",
         NoisePolicy::Stated,
     ),
     (
@@ -94,7 +94,7 @@ pub const NOISE: [Choice<NoisePolicy>; 4] = [
     ),
 ];
 
-/// Parses the name of one of these.
+/// Parses the name of an option value.
 pub fn one_of<T: Copy + Send + Sync>(
     choices: &'static [Choice<T>],
 ) -> impl TypedValueParser<Value = T> {
@@ -112,7 +112,7 @@ pub fn one_of<T: Copy + Send + Sync>(
     })
 }
 
-/// Parses the name of a format of exports.
+/// Parses the name of an export format.
 pub fn export_format() -> impl TypedValueParser<Value = Format> {
     let listed = |format: &Format| PossibleValue::new(format.name).help(format.about);
     PossibleValuesParser::new(FORMATS.iter().map(listed)).try_map(|name| {

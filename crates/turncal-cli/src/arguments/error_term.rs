@@ -22,7 +22,7 @@ pub fn listed(term: ErrorTerm) -> PossibleValue {
     }
 }
 
-/// The error term of a listed name; the only alias is that of Gauss–Markov biases.
+/// The error term with a listed name; only Gauss–Markov biases have an alias.
 pub fn named(name: &str) -> ErrorTerm {
     let mut all = ErrorTerm::ALL.into_iter();
     all.find(|term| term.name() == name)
@@ -44,7 +44,7 @@ fn help(term: ErrorTerm) -> &'static str {
     }
 }
 
-/// Exits with the status for wrong usage if this is a table error and the table is not observed.
+/// Exits with the wrong-usage status if the term is a table error and the table is not observed.
 pub fn needs_table(term: ErrorTerm, aiding: Option<Aiding>) {
     let of_table = matches!(term, ErrorTerm::TableBase | ErrorTerm::TableAxes(_));
     if of_table && aiding == Some(Aiding::Velocity) {

@@ -51,7 +51,7 @@ impl Estimation {
         }
     }
 
-    /// Calibration problem of a run.
+    /// Calibration problem for a run.
     pub fn problem<'a>(&self, run: &'a Run, path: &std::path::Path) -> anyhow::Result<Problem<'a>> {
         if self.aiding == Some(Aiding::Table) && run.recording.table.is_none() {
             return Err(CalibrationError::NoTable).with_context(|| path.display().to_string());
@@ -63,7 +63,7 @@ impl Estimation {
         Ok(problem)
     }
 
-    /// Joint calibration problem of several recordings of one instrument.
+    /// Joint calibration problem for several recordings of one instrument.
     pub fn together<'a>(
         &self,
         runs: &[&'a Run],
@@ -82,7 +82,7 @@ impl Estimation {
         Ok(problem)
     }
 
-    /// The options, without checks of a run.
+    /// The options, without checks that need a run.
     pub fn options(&self) -> Options {
         Options {
             form: self.installation,

@@ -68,7 +68,7 @@ impl OfLog {
         self.open_with(path, |found| show_found(path, found))
     }
 
-    /// As [`Self::open`], but passes the fields found in a log to `show`.
+    /// Does the same as [`Self::open`], but passes the fields found in a log to `show`.
     pub fn open_with(&self, path: &Path, show: impl FnOnce(&[Found])) -> anyhow::Result<Opened> {
         let (stream, stated) = self.stated()?;
         Ok(Opened::new(path, stream, &stated, |draft| {
@@ -99,7 +99,7 @@ pub fn run_file(text: &str) -> Result<PathBuf, String> {
     }
 }
 
-/// Path of a run.toml or a log, or `-`; for a run directory, the error names the file in it.
+/// Path of a run.toml or a log, or `-`; for a run directory, the error gives the file in it.
 pub fn run_or_log(text: &str) -> Result<PathBuf, String> {
     let path = Path::new(text);
     let inside = path.join("run.toml");

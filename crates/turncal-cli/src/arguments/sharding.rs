@@ -10,7 +10,7 @@ use crate::terminal::Runs;
 use turncal::study::{Shard, Study};
 use turncal_files::{Job, JobKind, Part, part_is_there, write_part};
 
-/// Part of a study to compute.
+/// The part of a study to compute.
 #[derive(Debug, Clone, Copy, clap::Args)]
 pub struct Sharding {
     /// Compute part i of M of the runs and write it to DIR for turncal merge
@@ -46,7 +46,7 @@ impl Sharding {
         })?;
         drop(progress);
         let written = begun.fill(|directory| write_part(directory, part.clone(), &made));
-        // Another process may have made the same part in the meantime.
+        // Another process may have computed the same part in the meantime.
         match written {
             Err(_) if part_is_there(target, &part) => {}
             written => written?,

@@ -13,7 +13,7 @@ pub fn shard(text: &str) -> Result<Shard, String> {
     text.parse().map_err(|error: ShardError| error.to_string())
 }
 
-/// A number between two others.
+/// A number within these limits.
 pub fn number(text: &str, low: f64, high: f64) -> Result<f64, String> {
     between(text, low, high).ok_or_else(|| format!("expected a number from {low} to {high}"))
 }
@@ -29,7 +29,7 @@ pub fn positive(text: &str) -> Result<f64, String> {
         .ok_or_else(|| "expected a number above zero".to_owned())
 }
 
-/// A duration in seconds, from a tenth to a day.
+/// A duration in seconds, from 0.1 s to one day.
 pub fn seconds(text: &str) -> Result<Duration, String> {
     Ok(Duration::from_secs_f64(number(text, 0.1, 86_400.0)?))
 }
@@ -44,7 +44,7 @@ pub fn height(text: &str) -> Result<f64, String> {
     number(text, *HEIGHTS.start(), *HEIGHTS.end())
 }
 
-/// m/s²
+/// Gravity in m/s².
 pub fn gravity(text: &str) -> Result<f64, String> {
     number(text, *GRAVITIES.start(), *GRAVITIES.end())
 }
@@ -55,7 +55,7 @@ pub fn hours(text: &str) -> Result<f64, String> {
         .ok_or_else(|| "expected a number of hours from 0.0167 (one minute) to 1000".to_owned())
 }
 
-/// Seed of all random numbers.
+/// Random seed.
 pub fn seed(text: &str) -> Result<u64, String> {
     text.parse()
         .map_err(|_| format!("expected a whole number from 0 to {}", u64::MAX))

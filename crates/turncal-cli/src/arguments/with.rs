@@ -14,7 +14,7 @@ pub enum With {
     Auto,
     /// K, E and D alone.
     None,
-    /// This term, in any case.
+    /// This term, whatever the data indicate.
     Term(ErrorTerm),
 }
 
@@ -34,17 +34,17 @@ impl With {
         }
     }
 
-    /// The terms that are named.
+    /// The terms given by name.
     pub fn terms(all: &[Self]) -> impl Iterator<Item = ErrorTerm> {
         all.iter().filter_map(|of| of.term())
     }
 
-    /// Whether all terms are averaged over, which is the default.
+    /// Whether the result is averaged over all terms (the default).
     pub fn is_auto(all: &[Self]) -> bool {
         all.iter().all(|of| *of == Self::Auto)
     }
 
-    /// Exits with the status for wrong usage if auto or none is combined with another value.
+    /// Exits with the wrong-usage status if auto or none is combined with another value.
     pub fn check(all: &[Self]) {
         let Some(&alone) = all.iter().find(|of| of.term().is_none()) else {
             return;
@@ -62,7 +62,7 @@ impl With {
         clap::Error::raw(ErrorKind::ArgumentConflict, message).exit();
     }
 
-    /// Writes the values by name. Auto is an empty list, as without `--with`, because both are the same job.
+    /// Writes the values by name. Auto is an empty list, as without `--with`, because both describe the same job.
     pub fn names<S: Serializer>(all: &[Self], serializer: S) -> Result<S::Ok, S::Error> {
         let stated = all.iter().filter(|of| **of != Self::Auto);
         serializer.collect_seq(stated.map(|of| of.name()))
@@ -73,7 +73,7 @@ impl With {
 pub fn with_value() -> impl TypedValueParser<Value = With> {
     let words = [
         PossibleValue::new("auto")
-            .help("Every error term, averaged over being absent and its usual sizes"),
+            .help("Every error term, as an average over its absence and its usual sizes"),
         PossibleValue::new("none").help("K, E and D alone"),
     ];
     let values = words.into_iter().chain(ErrorTerm::ALL.map(listed));

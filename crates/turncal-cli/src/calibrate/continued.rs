@@ -8,10 +8,10 @@ use anyhow::bail;
 
 use turncal_logs::csv_file::{RowKind, is_remark};
 
-/// Bytes at the begin and the end of the file that are examined.
+/// Number of bytes examined at the beginning and at the end of the file.
 const LOOK: u64 = 1 << 16;
 
-/// A file of rows, which new rows of the same kind continue.
+/// A file of rows to which new rows of the same kind are appended.
 pub struct Continued {
     log: PathBuf,
     pub kind: RowKind,
@@ -43,7 +43,7 @@ impl Continued {
         let kind = last.filter(|_| !head.contains(&0)).and_then(RowKind::of);
         let Some(kind) = kind else {
             bail!(
-                "found no rows of numbers at the end of the file, expected rows to continue. Name another file"
+                "found no rows of numbers at the end of the file, expected rows to continue. Choose another file"
             );
         };
         Ok(Some(Self {
@@ -56,8 +56,7 @@ impl Continued {
 
     /// Checks that the first lines of a source continue this file.
     ///
-    /// # Errors
-    /// If none of them is a row of the same kind, if they name other columns, or if the file contains all of them.
+    /// # Errors If no line is a row of the same kind, if the column names differ, or if the file already contains all rows.
     pub fn check(&self, first: &[Vec<u8>]) -> anyhow::Result<()> {
         let log = self.log.display();
         let lines = first.iter().filter(|line| !is_remark(line));
@@ -65,7 +64,7 @@ impl Continued {
             lines.partition(|line| self.kind.check(line).is_ok());
         if let (true, Some(why)) = (rows.is_empty(), others.last()) {
             let why = self.kind.check(why).err().unwrap_or_default();
-            bail!("{log}: {why} as in this file. Name another file for these rows");
+            bail!("{log}: {why} as in this file. Choose another file for these rows");
         }
         let is_names = |line: &&Vec<u8>| self.kind.is_names(line);
         let own = self.head.iter().find(is_names);
@@ -75,19 +74,19 @@ impl Continued {
         {
             let [own, new] = [own, new].map(|names| String::from_utf8_lossy(names.trim_ascii()));
             bail!(
-                "{log}: found the columns {new}, expected {own} as in this file. Name another file"
+                "{log}: found the columns {new}, expected {own} as in this file. Choose another file"
             );
         }
         if rows.len() > 1 && rows.iter().all(|row| self.head.contains(row)) {
             bail!(
-                "{log}: found rows that this file contains already, expected new ones. Name another file"
+                "{log}: found rows that this file contains already, expected new rows. Choose another file"
             );
         }
         Ok(())
     }
 }
 
-/// Bytes from here on, at most [`LOOK`].
+/// The bytes from this position on, at most [`LOOK`].
 fn look(file: &mut File, from: u64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     file.seek(SeekFrom::Start(from))?;

@@ -1,4 +1,4 @@
-//! `turncal calibrate --follow`: evaluates rows as they arrive, until they suffice or no more arrive.
+//! `turncal calibrate --follow`: evaluates rows as they arrive, until they suffice or no more rows arrive.
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -29,13 +29,13 @@ pub struct Follow<'a> {
     /// A growing file, `-` or a device.
     pub source: &'a Path,
     pub of_log: &'a OfLog,
-    /// The run.toml of the rows; it names the file that keeps those of a pipe or a device.
+    /// The run.toml of the rows; rows of a pipe or a device are saved in the log file given there.
     pub run: Option<&'a Path>,
     pub options: Options,
     pub specification: Option<Specification>,
-    /// File that keeps the rows of a pipe or a device.
+    /// File in which the rows of a pipe or a device are saved.
     pub keep: Option<&'a Path>,
-    /// A file that has not grown for this time is complete.
+    /// Time without growth after which a file is complete.
     pub patience: Duration,
     /// Whether standard output is reserved for the result.
     pub silent: bool,
@@ -68,7 +68,7 @@ impl Follow<'_> {
                 let begun = Instant::now();
                 known = rows.received.bytes;
                 if followed.evaluate(known, &mut screen)? {
-                    break "the calibration decides every limit";
+                    break "the calibration is accurate enough to decide every limit";
                 }
                 due = begun + APART.max(begun.elapsed().mul_f64(PAUSE));
             }
@@ -97,8 +97,8 @@ impl Follow<'_> {
             && log.metadata().is_ok_and(|of| of.len() > 0)
         {
             bail!(
-                "{}: found that [imu] names {}, which exists, expected a new file to keep the rows in. Name a new file \
-                 there, or follow that file",
+                "{}: found the existing file {} in [imu], expected a new file for the rows. Give a new file there, or \
+                 follow the existing file",
                 run.display(),
                 log.display()
             );
@@ -107,7 +107,7 @@ impl Follow<'_> {
         Incoming::kept(self.source, log.unwrap_or_else(default_log))
     }
 
-    /// A run.toml has to name the growing file.
+    /// Checks that the log in run.toml is the growing file.
     fn check_named(&self, named: Option<&Path>) -> anyhow::Result<()> {
         let (Some(run), Some(named)) = (self.run, named) else {
             return Ok(());
@@ -117,7 +117,7 @@ impl Follow<'_> {
             Ok(())
         } else {
             bail!(
-                "{}: [imu] names {}, but --follow {}. Follow the file named in run.toml",
+                "{}: [imu] gives the log {}, but --follow gives {}. Follow the log given in run.toml",
                 run.display(),
                 named.display(),
                 self.source.display()
@@ -126,7 +126,7 @@ impl Follow<'_> {
     }
 }
 
-/// The rows so far, and their evaluation.
+/// The rows received so far, and their evaluation.
 struct Followed<'a> {
     of_log: &'a OfLog,
     /// The run.toml or log to read.
@@ -134,12 +134,12 @@ struct Followed<'a> {
     /// The run read last, and the size of the log when its fields were found.
     opened: Option<(Opened, u64)>,
     evaluator: Evaluator,
-    /// The calibration of earlier rows, which would delay the status.
+    /// The calibration of earlier rows, in the background because it would delay the status.
     calibrating: Option<JoinHandle<Option<InterimCalibration>>>,
 }
 
 impl Followed<'_> {
-    /// Shows the result of the rows so far; returns whether they suffice.
+    /// Shows the result from the rows so far; returns whether these rows suffice.
     fn evaluate(&mut self, size: u64, screen: &mut Screen) -> anyhow::Result<bool> {
         if let Err(error) = self.open(size) {
             screen.trouble(&format!("{error:#}"))?;

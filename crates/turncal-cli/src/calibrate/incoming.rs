@@ -1,4 +1,4 @@
-//! Rows that arrive while a log is followed: of a growing file, a pipe or a device.
+//! Rows that arrive while a log is followed, from a growing file, a pipe or a device.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, Read, Seek, SeekFrom, Write};
@@ -31,13 +31,13 @@ enum Kind {
         /// Length of the file without its incomplete last line, until that line is removed.
         cut: Option<u64>,
         lines: Box<Lines>,
-        /// Bytes; `None` if the device is gone.
+        /// Bytes received; `None` if the device is gone.
         chunks: Receiver<Option<Vec<u8>>>,
     },
 }
 
 impl Incoming {
-    /// Rows of a growing file, which is complete when it has not grown for this time.
+    /// Rows of a growing file. The file is complete when it has not grown for this time.
     pub fn growing(log: &Path, patience: Duration) -> Self {
         let grew = Instant::now();
         Self {
@@ -47,7 +47,7 @@ impl Incoming {
         }
     }
 
-    /// Rows of standard input (`-`) or a device, which are appended to a file of rows of the same kind.
+    /// Rows from standard input (`-`) or a device, appended to a file of rows of the same kind.
     pub fn kept(source: &Path, log: PathBuf) -> anyhow::Result<Self> {
         if source != Path::new("-") {
             let there = source.metadata();
@@ -76,7 +76,7 @@ impl Incoming {
         match &mut self.kind {
             Kind::Growing { grew, patience } => {
                 thread::sleep(most);
-                // A file that is gone for a while does not grow.
+                // A file that is temporarily missing counts as not growing.
                 let mut file = File::open(&self.log);
                 let read = file.as_mut().map(|file| {
                     file.seek(SeekFrom::Start(self.received.bytes))?;
@@ -162,7 +162,7 @@ impl Write for Received {
     }
 }
 
-/// Whether this is a serial device, which does not wait for a reader.
+/// Whether this is a serial device (such a device does not wait for a reader).
 #[cfg(unix)]
 fn is_serial(source: &Path) -> bool {
     use std::os::unix::fs::FileTypeExt;
@@ -171,13 +171,13 @@ fn is_serial(source: &Path) -> bool {
         .is_ok_and(|of| of.file_type().is_char_device())
 }
 
-/// Anything but standard input, where the system does not tell.
+/// Anything except standard input, if the system does not provide this information.
 #[cfg(not(unix))]
 fn is_serial(source: &Path) -> bool {
     source != Path::new("-")
 }
 
-/// Reads standard input or a device, which is reopened when it returns after it was gone.
+/// Reads standard input or a device; a device that disappeared is reopened when it returns.
 fn read_in_background(source: PathBuf) -> anyhow::Result<Receiver<Option<Vec<u8>>>> {
     let (chunks, received) = mpsc::channel();
     let is_stdin = source == Path::new("-");

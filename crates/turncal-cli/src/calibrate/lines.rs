@@ -5,19 +5,19 @@ use std::mem;
 use super::continued::Continued;
 use turncal_logs::csv_file::{RowKind, is_remark};
 
-/// Bytes without the end of a line that are kept nevertheless, such as those of a device at the wrong baud rate.
+/// Maximum number of bytes kept without a line end, for example from a device at the wrong baud rate.
 const LONGEST_LINE: usize = 4096;
-/// Number of consecutive rows that are alike, which define the kind of all rows.
+/// Number of consecutive rows of one kind that define the kind of all rows.
 const ALIKE: usize = 8;
-/// Maximum number of lines that are held until rows are alike.
+/// Maximum number of lines held back until the kind of the rows is known.
 const MOST_HELD: usize = 64;
-/// Maximum number of lines left out that are described.
+/// Maximum number of omitted lines that are described.
 const MOST_NAMED: usize = 5;
 
-/// Why the first line of a device is left out.
+/// Reason for omitting the first line of a device.
 const CUT: &str = "perhaps only the end of a row";
 
-/// Holds the first lines until several rows are alike; from then on, keeps only rows of their kind.
+/// Holds back the first lines until several rows are alike; from then on, keeps only rows of that kind.
 #[derive(Default)]
 pub struct Lines {
     begin_anywhere: bool,
@@ -96,7 +96,7 @@ impl Lines {
         }
     }
 
-    /// The rest.
+    /// The remaining bytes to keep.
     ///
     /// # Errors
     /// If the rows do not continue those of the file.
@@ -163,7 +163,7 @@ impl Lines {
             let wrong = match kind.check(&line) {
                 _ if is_remark(&line) || is_above && kind.is_names(&line) => None,
                 _ if is_cut && k == 0 => Some(CUT.to_owned()),
-                Ok(()) => is_above.then(|| "a row above the names of columns".to_owned()),
+                Ok(()) => is_above.then(|| "a row above the column names".to_owned()),
                 Err(why) => (!is_above || self.begin_anywhere).then_some(why),
             };
             match wrong {
@@ -180,7 +180,7 @@ impl Lines {
 mod tests {
     use super::*;
 
-    /// Lines kept of these bytes, which arrive one by one, and the first reasons for those left out.
+    /// Lines kept of these bytes if they arrive one by one, and the first reasons for omitting the others.
     fn kept(begin_anywhere: bool, bytes: &str) -> (String, Vec<String>) {
         let mut lines = Lines::new(begin_anywhere, None);
         let bytes = bytes.as_bytes().chunks(1);

@@ -25,7 +25,7 @@ use turncal_report::terminal::printable;
 const DIRECTORY: &str = "lot-calibration";
 
 impl Calibrate {
-    /// Calibrates every run and compares them.
+    /// Calibrates every run and compares the calibrations.
     pub fn lot(&self) -> anyhow::Result<()> {
         let names = unit_names(&self.runs)?;
         let specification = self.specification.as_deref();
@@ -124,7 +124,7 @@ impl Calibrate {
         let named = (&problem, run.recording.name.as_str());
         let document = calibration::within(named, of, None, limits.as_ref());
         let calibration = checked.calibration;
-        // What cannot be written is no calibration.
+        // A calibration that cannot be written counts as failed.
         turncal_files::calibration_json(&calibration, path)?;
         let dwells = problem.dwells().map(|dwell| dwell.samples.clone());
         let noise = RestNoise::of(&run.recording.imu, &dwells.collect::<Vec<_>>());
@@ -132,7 +132,7 @@ impl Calibrate {
     }
 }
 
-/// Opens the directory of a lot, and says so if another process must finish first.
+/// Opens the directory of a lot, and prints a note if another process must finish first.
 pub fn open_directory(
     target: &Path,
     part: &Part,

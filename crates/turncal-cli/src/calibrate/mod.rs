@@ -50,11 +50,10 @@ const FOLLOWING: &str = "Following a log";
 /// Writes DIR/calibration.json and DIR/report/, and prints a summary. Exit status: 0 if the values may be used, 1 if
 /// they must not (FAILED), 3 if --require or a specification is not met.
 ///
-/// With --temperature, parameters depend on the temperature column; for an instrument at rest in one attitude, only
-/// biases do.
+/// With --temperature, parameters depend on the temperature column; for a recording in one attitude, only biases do.
 ///
-/// A campaign.toml names several recordings of one instrument, which are calibrated jointly: parameters may depend
-/// on temperature and differ from day to day.
+/// A campaign.toml lists several recordings of one instrument. They are calibrated jointly: parameters may depend on
+/// temperature and differ from day to day.
 ///
 /// Several runs are the units of a lot: each is calibrated into DIR/units/NAME/, and DIR/lot.json, lot.csv and
 /// index.html summarise the lot. Units that fail are listed with the reason; the command then fails after writing
@@ -90,7 +89,7 @@ pub struct Calibrate {
     /// Let parameters depend on the temperature column of the run (the default for campaigns with known temperature)
     #[arg(long, conflicts_with_all = ["specification", "shard"])]
     temperature: bool,
-    /// True calibration, not used by the estimator; summary and report show the errors relative to it
+    /// True calibration, not used by the estimator; summary and report then show the errors
     #[arg(long, value_name = "FILE")]
     truth: Option<PathBuf>,
     /// Parameters that must be determined; otherwise the exit status is 3
@@ -106,11 +105,12 @@ pub struct Calibrate {
     /// specification can be decided, no more rows arrive, or Ctrl-C is pressed
     #[arg(long, conflicts_with_all = ["shard", "temperature", "truth"], help_heading = FOLLOWING)]
     follow: bool,
-    /// File for the rows of - or a device; an existing file must contain rows of the same kind, and is continued
-    /// [default: follow-TIME.csv]
+    /// File in which rows from standard input (-) or a device are saved; an existing file must contain rows of the same
+    /// kind, and is continued [default: follow-TIME.csv]
     #[arg(long, value_name = "FILE", requires = "follow", help_heading = FOLLOWING)]
     keep: Option<PathBuf>,
-    /// The run.toml that describes the rows; the file that it names keeps the rows of - or a device, and must be new
+    /// run.toml that describes the rows; rows from standard input (-) or a device are saved in the log file given
+    /// there, which must be new
     #[arg(long, value_name = "RUN.toml", requires = "follow", conflicts_with = "keep", value_parser = run_file, help_heading = FOLLOWING)]
     run: Option<PathBuf>,
     /// Time without growth after which a followed file is complete, s
@@ -304,7 +304,7 @@ impl Calibrate {
         self.judge(name, &solution, calibration)
     }
 
-    /// Fails if the values must not be used, or if what was asked of them is not met.
+    /// Fails if the values must not be used, or if a requirement is not met.
     fn judge(
         &self,
         name: &str,
@@ -364,7 +364,7 @@ fn read_by(opened: Option<&Opened>, target: Option<&Path>, path: &Path) -> PathB
     }
 }
 
-/// Files written, and the next command.
+/// Prints the files written, and the next command.
 fn files(target: Option<&Path>, run: &Path, document: &Document) -> Facts {
     let mut facts = Facts::default();
     let shown = |path: PathBuf| path.display().to_string();
@@ -415,7 +415,7 @@ pub fn write_report(document: &Document, directory: &Path) -> anyhow::Result<()>
     Ok(report::write(document, directory)?)
 }
 
-/// A truth, converted to the general form, which can represent any other.
+/// The truth, converted to the general form, which can represent all other forms.
 pub fn read_truth(path: &Path, run: &Run, body_frame: BodyFrame) -> anyhow::Result<Truth> {
     let record = turncal_files::read_calibration(path)?;
     if let Some(unit) = &record.unit

@@ -1,6 +1,6 @@
-//! What was asked of a calibration and is not met.
+//! Requirements on a calibration that are not met.
 
-/// It was calibrated, but what was asked of it is not met.
+/// The calibration succeeded, but a requirement is not met.
 #[derive(Debug, thiserror::Error)]
 pub enum NotMet {
     /// Limits of a specification.

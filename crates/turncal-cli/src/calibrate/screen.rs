@@ -22,7 +22,7 @@ pub struct Screen {
     trouble: String,
     /// Notes already reported, without their figures.
     noted: BTreeSet<String>,
-    /// Lines left out.
+    /// Number of lines left out, and the first reasons.
     left_out: Option<String>,
     /// Content of the screen below the number of lines received.
     content: Vec<String>,

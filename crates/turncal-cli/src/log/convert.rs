@@ -16,7 +16,7 @@ use turncal_files::draft::Draft;
   turncal convert flight.ulg -o my-run
   turncal convert drive.mcap --stream /imu/data -o my-run")]
 pub struct Convert {
-    /// Log file, whose format is identified by content
+    /// Log file; its format is identified by its content
     log: PathBuf,
     /// Directory to write
     #[arg(short, long, value_name = "DIR")]

@@ -8,7 +8,7 @@ use turncal_files::draft::Draft;
 use turncal_files::write_whole;
 use turncal_logs::DataFile;
 
-/// Writes a draft of run.toml for a log without one
+/// Drafts a run.toml for a log
 ///
 /// Identifies the columns by name or value, the time unit, the sensor units (from gravity at rest and its change when
 /// the gyros turn), and the white noise at rest, and gives a reason for each guess. Fields that the log cannot show are
@@ -21,7 +21,7 @@ use turncal_logs::DataFile;
   turncal init Gyroscope.csv Accelerometer.csv")]
 pub struct Init {
     /// Rows of numbers with or without a line of names (`.csv`, `.txt`, `.tsv`, `.dat` or `.log`, also `.gz`); or MCAP,
-    /// a ROS bag, PX4 ULog, ArduPilot DataFlash, MAT, NPY or NPZ, whose streams are listed
+    /// a ROS bag, PX4 ULog, ArduPilot DataFlash, MAT, NPY or NPZ (init lists their streams)
     #[arg(value_name = "IMU.csv")]
     log: PathBuf,
     /// Log of the accelerometers, as with --accel-file
@@ -70,7 +70,7 @@ impl Init {
         Ok(())
     }
 
-    /// Name of a log in the new file, which is next to the log by default.
+    /// Name of a log as written in the new file. By default the new file is next to the log.
     fn name(&self, log: &Path) -> String {
         let directory = |path: &Path| {
             let parent = path.parent().filter(|parent| *parent != Path::new(""));

@@ -7,7 +7,7 @@ use turncal_report::conversion;
 
 /// Converts a noise figure to every convention: data sheets, Kalibr, PSINS, KF-GINS
 ///
-/// Each line names the convention and its users. Densities are two-sided, as in IEEE Std 952; a one-sided density is √2
+/// Each line gives the convention and its users. Densities are two-sided, as in IEEE Std 952; a one-sided density is √2
 /// times as large. A unit of rate or acceleration (deg/s, m/s^2) means noise per sample with --rate, and bias
 /// instability without.
 #[derive(Debug, clap::Args)]

@@ -24,9 +24,9 @@ const SUSPECT_SIGMAS: f64 = 10.0;
 ///
 /// Writes one row per sample: start and end in s, angular rate in rad/s and specific force in m/s², both averaged over
 /// the sample, along right, front and up in the body frame of the calibration. Error terms of the calibration are also
-/// corrected, as is temperature dependence if the run has a temperature; the correction of the time offset neglects
-/// Earth rate. The last column names the verdict of the calibration, such as verdict_good, and contains 1. The output can
-/// itself be the log of a run.toml: output = "rate", time_stamp = "end".
+/// corrected, and so is temperature dependence if the run has a temperature; the correction of the time offset neglects
+/// Earth rate. The name of the last column is the verdict of the calibration, such as verdict_good; the column contains
+/// 1. The output can itself be the log of a run.toml: output = "rate", time_stamp = "end".
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal apply result/calibration.json run.toml -o calibrated.csv.gz
@@ -107,7 +107,7 @@ impl Apply {
         Ok(())
     }
 
-    /// Exits if the name of the output is not that of a CSV file.
+    /// Exits if the output does not have the name of a CSV file.
     fn check_output(&self) {
         if let Some(output) = &self.output {
             let name = output.to_string_lossy();
@@ -169,7 +169,7 @@ fn notes(record: &Calibration, correction: &Correction, run: &Run) -> Vec<String
     notes
 }
 
-/// Notes if the temperature of the run is unknown or outside the range of the calibration.
+/// Prints a note if the temperature of the run is unknown or outside the range of the calibration.
 fn of_temperature(thermal: &ThermalRecord, run: &Run) -> Vec<String> {
     let Some(temperature) = &run.recording.imu.temperature else {
         return vec![format!(

@@ -16,8 +16,8 @@ use turncal_report::certificate::{Certificate as Content, Conformity, Decision};
 ///
 /// DIR/certificate.pdf contains the fields that ISO/IEC 17025 requires of a certificate, from calibration.json and
 /// lab.toml. dcc.xml (PTB DCC 3.3.0, with D-SI units and the covariance matrix) and calibration.json are embedded in it
-/// and also written to DIR. Missing required fields are named. All dates come from lab.toml, so the same files give the
-/// same bytes. The certificate claims no accreditation.
+/// and also written to DIR. Missing required fields are listed. All dates come from lab.toml, so the same input gives
+/// the same bytes. The certificate claims no accreditation.
 ///
 /// For a draft of lab.toml, run turncal certificate --draft
 #[derive(Debug, clap::Args)]

@@ -14,7 +14,7 @@ use turncal_report as report;
 ///
 /// All calibrations are first converted to the general misalignment form and one body frame. Differences are from the
 /// truth or, for two calibrations without a truth, from the first. For three or more, the mean, scatter and χ² of the
-/// scatter relative to the stated σ are also shown, and outliers are named. A calibration whose verdict is FAILED is
+/// scatter relative to the stated σ are also shown, and outliers are marked. A calibration whose verdict is FAILED is
 /// refused without --force.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  turncal compare monday.json friday.json --truth truth.json")]
@@ -44,7 +44,7 @@ impl Compare {
         let units = named.map(|(name, path)| {
             let force = self.delivery.force();
             let mut calibration = usable(path, self.temperature_degc, force)?;
-            // A comparison leaves out units that did not converge, but this one was asked for.
+            // A comparison leaves out units that did not converge, but this unit was requested explicitly.
             calibration.converged = calibration
                 .converged
                 .filter(|converged| *converged || !force);

@@ -149,7 +149,7 @@ impl Navigate {
         begun.deliver(&navigation.document())
     }
 
-    /// How the body moves, and the name of its trajectory.
+    /// The motion of the body, and the name of its trajectory.
     fn motion(&self, calibration: &Calibration) -> anyhow::Result<(Motion, Option<String>)> {
         let latitude = self.latitude_deg.map(|latitude| latitude * DEGREE);
         if let Some(name) = &self.trajectory {

@@ -59,7 +59,7 @@ pub struct Accuracy {
     /// Number of runs
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = at_least_two)]
     runs: u64,
-    /// Seed of all random numbers [default: from the scenario]
+    /// Random seed [default: from the scenario]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = seed)]
     seed: Option<u64>,
     #[command(flatten)]

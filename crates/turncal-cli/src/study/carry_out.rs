@@ -1,4 +1,4 @@
-//! A whole study.
+//! Runs of a whole study.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -8,7 +8,7 @@ use crate::terminal::Runs;
 use turncal::study;
 use turncal_report::Document;
 
-/// Makes a whole study and delivers the document of its outcome.
+/// Runs a whole study and delivers the document with its outcome.
 pub fn carry_out<S: study::Study>(
     study: &S,
     delivery: &Delivery,

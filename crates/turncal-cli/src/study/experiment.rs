@@ -18,8 +18,8 @@ const SCENARIO: &str = "experiment";
 /// Simulates the turntable experiment of the paper: navigation accuracy after each calibration
 ///
 /// Simulates many instruments on a table with position errors, with noise and Gauss–Markov biases. Calibrates each with
-/// the closed form on the static positions of the paper and with the filter (in a sixth of that time and in the same
-/// time), in all misalignment forms. Navigates with the remaining errors: at rest, with self-alignment or perfect
+/// the closed form on the paper's static positions, and with the filter in a sixth of that table time and in the same
+/// table time, in all misalignment forms. Navigates with the remaining errors: at rest, with self-alignment or perfect
 /// alignment, and moving. Shows the position error of every method, and the parameters that cause it.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
@@ -30,7 +30,7 @@ pub struct Experiment {
     /// Number of instruments
     #[arg(long, value_name = "N", default_value_t = 50, value_parser = at_least_two)]
     samples: u64,
-    /// Seed of all random numbers [default: from the scenario]
+    /// Random seed [default: from the scenario]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = seed)]
     seed: Option<u64>,
     /// Trajectory of the moving instrument: a TOML file or an embedded name

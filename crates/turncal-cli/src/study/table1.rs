@@ -22,7 +22,7 @@ pub struct Table1 {
     /// Number of samples
     #[arg(long, value_name = "N", default_value_t = paper::SAMPLES as u64, value_parser = at_least_two)]
     samples: u64,
-    /// Seed of all random numbers
+    /// Random seed
     #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = seed)]
     seed: u64,
     /// Duration of a run in hours (one minute to 1000 h)

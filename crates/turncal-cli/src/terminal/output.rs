@@ -38,7 +38,7 @@ fn in_colour(word: Word) -> String {
     format!("\u{1b}[1;{colour}m{word}\u{1b}[0m")
 }
 
-/// Width of standard output: from its terminal, else COLUMNS, else unlimited.
+/// Width of standard output: that of its terminal, otherwise COLUMNS, otherwise unlimited.
 pub fn columns() -> Option<u16> {
     let terminal = terminal_size::terminal_size_of(io::stdout()).map(|(width, _)| width.0);
     terminal.or_else(|| std::env::var("COLUMNS").ok()?.parse().ok())

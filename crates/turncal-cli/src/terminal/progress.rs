@@ -12,7 +12,7 @@ use turncal_report::terminal::printable;
 /// Current activity with its elapsed time.
 pub struct Activity {
     bar: ProgressBar,
-    /// Dropping it ends the thread that updates the time.
+    /// Dropping the sender ends the thread that updates the time.
     ticking: Option<Sender<()>>,
 }
 
@@ -63,7 +63,7 @@ fn tick(bar: &ProgressBar) -> Option<Sender<()>> {
 pub struct Runs(ProgressBar);
 
 impl Runs {
-    /// Shows that none is finished.
+    /// Shows that no run is finished yet.
     pub fn new(runs: u64) -> Self {
         let bar = ProgressBar::new(runs);
         let template = "{wide_bar} {pos} of {len} runs, {eta} to go";
@@ -73,7 +73,7 @@ impl Runs {
         Self(bar)
     }
 
-    /// Adds a finished run.
+    /// Counts one more finished run.
     pub fn one_done(&self) {
         self.0.inc(1);
     }

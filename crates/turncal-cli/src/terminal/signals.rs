@@ -7,7 +7,7 @@ static ENDS_GENTLY: AtomicBool = AtomicBool::new(false);
 /// Whether Ctrl-C was pressed.
 static ENDED: AtomicBool = AtomicBool::new(false);
 
-/// From here on, the first Ctrl-C or request to end makes [`is_ended`] true; the next one ends the command.
+/// From this call on, the first Ctrl-C or termination request makes [`is_ended`] true; the next one ends the command.
 pub fn end_gently() {
     ENDS_GENTLY.store(true, Ordering::SeqCst);
 }
@@ -35,7 +35,7 @@ pub fn leave_nothing_behind() {
         let all = [SIGINT, SIGTERM, SIGHUP].into_iter();
         all.filter(|&signal| !is_ignored(signal))
     };
-    // From here on a signal waits for the thread, however long that takes to begin.
+    // From here on, a signal waits for the thread, however long its start takes.
     let Ok(mut signals) = Signals::new(heeded()) else {
         return;
     };
@@ -51,12 +51,12 @@ pub fn leave_nothing_behind() {
                 if let Some(unfinished) = unfinished {
                     unfinished.abandon();
                 }
-                // Ended by the signal itself, so that a shell's loop over many runs ends, too.
+                // The command is ended by the signal itself, so that a shell loop over many runs also ends.
                 let _ = emulate_default_handler(signal);
                 process::exit(128 + signal);
             }
         });
-    // Without a thread the signals do what they do by default; the next run clears up.
+    // Without a thread, the signals have their default effect; the next run cleans up.
     if thread.is_err() {
         for signal in heeded() {
             let _ = register_conditional_default(signal, Arc::new(AtomicBool::new(true)));

@@ -6,13 +6,13 @@ use std::thread;
 
 use rayon::{ThreadPoolBuildError, ThreadPoolBuilder};
 
-/// Runs `work` on one thread per processor, or as many as RAYON_NUM_THREADS states, or only on this one if the system
-/// refuses more.
+/// Runs `work` on one thread per processor, on the number given in RAYON_NUM_THREADS, or only on the current thread if
+/// the system refuses more.
 pub fn with_threads<T: Send>(work: impl FnOnce() -> T + Send) -> Result<T, ThreadPoolBuildError> {
     match ThreadPoolBuilder::new().build() {
         Ok(pool) if pool.current_num_threads() > 1 => return Ok(pool.install(work)),
-        // The first thread does as well, and better where addresses are few: glibc has 64 MB of them for every
-        // other thread, and where it cannot have them asks anew at each allocation.
+        // The first thread serves as well, and better if address space is limited: glibc reserves 64 MB for every other
+        // thread and, if that fails, tries again at each allocation.
         Ok(_) => {}
         Err(_) => {
             tell!("note: the system does not allow more threads; using one thread");
@@ -41,7 +41,7 @@ pub fn piece_by_piece<T: Send>(count: usize, work: impl Fn(usize) -> T + Sync) -
             results.push((piece, result));
         }
     };
-    // Threads that pieces are fewer than work inside them.
+    // If there are fewer pieces than threads, the other threads work inside the pieces.
     let own_pool = || {
         let pool = ThreadPoolBuilder::new().num_threads((threads / workers).max(1));
         match pool.build() {
@@ -51,7 +51,7 @@ pub fn piece_by_piece<T: Send>(count: usize, work: impl Fn(usize) -> T + Sync) -
     };
     thread::scope(|scope| {
         for _ in 1..workers {
-            // Where no more can be started, those that are there do it all.
+            // If no more threads can be started, the existing ones do all the work.
             let _ = thread::Builder::new().spawn_scoped(scope, own_pool);
         }
         own_pool();

@@ -13,7 +13,7 @@ use turncal_input::small_file;
 
 /// SHA-256 of a value as JSON, in hexadecimal digits.
 pub fn digest_of(value: &impl Serialize) -> String {
-    // What cannot be written as JSON, a map without names, is in none of the values that come here.
+    // None of the values hashed here contains a map without names, the only thing that cannot be written as JSON.
     let text = serde_json::to_vec(value).unwrap_or_default();
     hexadecimal(&Sha256::digest(text))
 }
@@ -64,7 +64,7 @@ pub fn input_digests(run: &Path) -> Vec<(String, String)> {
     all
 }
 
-/// The content of a run.toml or a campaign.toml, which may be invalid; a log names no files.
+/// The content of a run.toml or campaign.toml, even if it is invalid; a log refers to no other files.
 fn table_of(path: &Path) -> Table {
     if !is_toml(path) {
         return Table::new();

@@ -20,11 +20,11 @@ const FORMAT: &str = "turncal-job/1";
 pub struct Job {
     /// Always [`FORMAT`].
     format: String,
-    /// Kind.
+    /// Kind of job.
     pub job: JobKind,
     /// The program's version.
     pub version: String,
-    /// Processor type and features, which affect rounding.
+    /// Processor type and features; they affect rounding.
     pub processor: Vec<String>,
     /// All options that determine the result of a run.
     pub options: Value,
@@ -109,7 +109,7 @@ impl Job {
     }
 }
 
-/// The first value in which two differ, with its name.
+/// The first value that differs between two jobs, with its name.
 fn first_difference(name: &str, a: &Value, b: &Value) -> Option<String> {
     if a == b {
         return None;
@@ -157,7 +157,7 @@ impl Part {
         let path = directory.join(JOB_FILE);
         let advice = "Give a directory that turncal wrote for a lot or with --shard.";
         let part: Self = small_file::json(&path, "a job", FORMAT, advice)?;
-        // Compared one by one: the file may claim any number of runs.
+        // The runs are compared one by one, because the file may state any number of runs.
         let named = part.job.names.len() as u64 == part.job.runs;
         let is_whole = match part.shard {
             Some(shard) => shard.runs(part.job.runs).eq(part.holds.iter().copied()),
@@ -174,7 +174,7 @@ impl Part {
 
     /// The bytes of `job.json`.
     pub fn to_json(&self) -> Vec<u8> {
-        // Names, numbers and texts are all there is: these can always be written.
+        // The job contains only names, numbers and texts; these can always be written.
         small_file::pretty(self).unwrap_or_default()
     }
 }

@@ -15,9 +15,9 @@ use turncal::lot::{Calibrated, Unit};
 use turncal::noise::RestNoise;
 use turncal_input::{FileError, small_file};
 
-/// The directory of the units in that of the lot.
+/// Name of the directory of the units, within the directory of the lot.
 const UNITS: &str = "units";
-/// Data of a unit in addition to its calibration.
+/// Name of the file with the data of a unit in addition to its calibration.
 const UNIT_FILE: &str = "unit.json";
 const CALIBRATION_FILE: &str = "calibration.json";
 /// The version of the format of [`UNIT_FILE`].
@@ -63,7 +63,7 @@ impl LotDirectory {
     /// finish first. With `force` the lot restarts from the beginning.
     ///
     /// # Errors
-    /// [`FileError`] if the directory contains another job, another part of this one, units that do not belong to this
+    /// [`FileError`] if the directory contains another job, another part of this job, units that do not belong to this
     /// lot, or files not written by turncal in places that would be overwritten.
     pub fn open(
         target: &Path,
@@ -200,7 +200,7 @@ fn check_units(units: &Path, part: &Part) -> Result<(), FileError> {
     })
 }
 
-/// A unit, of this key if one is expected, and its key.
+/// A unit and its key; the key must be the expected one, if there is one.
 fn read_unit(directory: &Path, key: Option<&str>) -> Result<(Unit, String), FileError> {
     let path = directory.join(UNIT_FILE);
     let record: UnitRecord =

@@ -1,4 +1,4 @@
-//! Parts of a job: written by one machine each, and merged by one.
+//! Parts of a job: each is written by one machine, and one machine merges them.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -12,7 +12,7 @@ use turncal_input::{FileError, list};
 
 /// Results of the runs of a study as MessagePack, which preserves every bit of a number.
 const RESULTS: &str = "runs.msgpack";
-/// Maximum number of missing runs named.
+/// Maximum number of missing runs listed in an error.
 const NAMED: usize = 5;
 
 /// Writes a part of a study into an existing directory.
@@ -60,8 +60,7 @@ pub struct Parts {
 impl Parts {
     /// Reads the job records of directories.
     ///
-    /// # Errors [`FileError`] if one is not a part, if they are parts of different jobs, or if a run is in none or in
-    /// two of them.
+    /// # Errors [`FileError`] if a directory is not a part, if the parts belong to different jobs, or if a run is missing or is in two parts.
     pub fn read(directories: &[PathBuf]) -> Result<Self, FileError> {
         let read = |directory: &PathBuf| Ok((directory.clone(), Part::read(directory)?));
         let parts: Result<Vec<_>, FileError> = directories.iter().map(read).collect();
@@ -74,7 +73,8 @@ impl Parts {
         for (directory, part) in &parts[1..] {
             if let Some(difference) = reference.job.any_difference(&part.job) {
                 let first = first.display();
-                let found = format!("a part of a different job from {first} ({difference})");
+                let found =
+                    format!("a part of a job that differs from that of {first} ({difference})");
                 let advice = "Merge only parts made by the same version, with the same arguments, on processors of the \
                               same type.";
                 return Err(FileError::of(

@@ -7,11 +7,11 @@ use turncal::calibration::Calibration;
 use turncal::calibration::result::InputFile;
 use turncal::run::Run;
 
-/// Records the inputs of a calibration with their digests: the files that a run.toml or campaign.toml names, or all files
+/// Records the inputs of a calibration with their digests: the files given in a run.toml or campaign.toml, or all files
 /// of a log.
 pub fn record_inputs(calibration: &mut Calibration, path: &Path, run: &Run) {
     let is_log = path.extension().is_none_or(|end| end != "toml");
-    // No run.toml names the second file of a log.
+    // The second file of a log is not given in any run.toml.
     let others = run.recording.files.iter().skip(1).filter(|_| is_log);
     let files = std::iter::once(path).chain(others.map(PathBuf::as_path));
     let digests = files.flat_map(input_digests);

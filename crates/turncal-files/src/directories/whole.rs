@@ -79,7 +79,7 @@ impl WholeDirectory {
         self.commit_with(&list)
     }
 
-    /// Moves a growing directory into place: see `list_anew`.
+    /// Moves a growing directory into place; see `list_anew`.
     pub fn commit_growing(self, names: &[&str]) -> Result<(), FileError> {
         let list = manifest::of_names(names.iter().copied());
         self.commit_with(&list)
@@ -87,7 +87,7 @@ impl WholeDirectory {
 
     fn commit_with(self, list: &str) -> Result<(), FileError> {
         let target = self.stage.target();
-        // Something may have been put into it since.
+        // Another program may have put a file into the directory in the meantime.
         if self.force && target.is_dir() {
             only_output(target)?;
         }
@@ -97,8 +97,8 @@ impl WholeDirectory {
     }
 }
 
-/// Writes the list of a growing directory, in which only these names belong to turncal; entries that end in `/` have
-/// their own list. Files named only in the previous list are deleted.
+/// Writes the list of a growing directory, according to which only these names belong to turncal; entries that end in
+/// `/` have their own list. Files named only in the previous list are deleted.
 pub fn list_anew(directory: &Path, names: &[&str]) -> Result<(), FileError> {
     for old in manifest::listed_files(directory) {
         let still = |name: &&str| old.file_name() == Some(name.as_ref());
@@ -122,7 +122,7 @@ fn only_output(directory: &Path) -> Result<(), FileError> {
         .map_err(|error| unwritable(directory, "list the directory", &error))?;
     foreign.map_or(Ok(()), |foreign| {
         let (name, list) = (foreign.display(), manifest::FILE);
-        let found = format!("`{name}` in it, which turncal's list of its own files (`{list}`) does not name");
+        let found = format!("`{name}` in it, which is not in turncal's list of its own files (`{list}`)");
         let expected = "a directory with only files that turncal wrote";
         let advice = "Move this file elsewhere or choose another name, because replacing the directory would delete \
             the file.";
@@ -135,7 +135,7 @@ pub fn write_whole(path: &Path, bytes: &[u8], force: bool) -> Result<(), FileErr
     write_whole_with(path, force, |mut file| file.write_all(bytes))
 }
 
-/// As [`write_whole`] for output too large for memory: `write` receives the temporary file.
+/// Does the same as [`write_whole`] for output too large for memory: `write` receives the temporary file.
 pub fn write_whole_with(
     path: &Path,
     force: bool,

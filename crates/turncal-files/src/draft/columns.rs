@@ -17,12 +17,12 @@ pub struct Columns {
     /// Nanoseconds in addition to a time in whole seconds.
     pub nanoseconds: Option<usize>,
     pub triads: PerSensor<Option<[usize; 3]>>,
-    /// Other candidates.
+    /// Other candidates for the triads.
     pub others: PerSensor<Vec<[usize; 3]>>,
     /// Whether the triads were identified by value, because their names are not informative.
     pub by_size: bool,
     pub temperature: Option<usize>,
-    /// Four columns of norm one.
+    /// Four columns with a norm of one.
     pub quaternion: Option<[usize; 4]>,
 }
 
@@ -32,7 +32,7 @@ const NUMBERS: f64 = 0.5;
 const LACKING: f64 = 0.1;
 /// Maximum number of instruments in a log.
 const MOST_INSTANCES: usize = 8;
-/// Fraction of increasing steps of a time column, and of a column named as time, which may repeat.
+/// Fraction of increasing steps in a time column, and in a column with the name of a time, where values may repeat.
 const FORWARD: f64 = 0.9;
 const SELDOM_FORWARD: f64 = 0.01;
 /// Accelerometers have the magnitude of gravity within this fraction in half of the rows …
@@ -52,7 +52,8 @@ impl Columns {
             .map(|(name, unit)| Name::of_column(name, unit))
             .collect();
         let mut found = PerSensor::from_fn(|sensor| by_name(&names, sheet, sensor));
-        // Of several the first with a unit, and that is gravity's in those of the accelerometers.
+        // If there are several triads, those with a unit come first; for accelerometers, first of all those with a
+        // constant magnitude.
         let is_bare =
             |triad: &[usize; 3]| names[triad[0]].unit.is_none_or(|unit| unit.word == "count");
         found.gyro.sort_by_key(is_bare);
@@ -94,7 +95,7 @@ impl Columns {
         }
     }
 
-    /// Replaces columns by the columns that the user states.
+    /// Replaces detected columns by the columns stated by the user.
     pub fn state(&mut self, stated: &StatedColumns) {
         let place = |name: &String| self.names.iter().position(|of| of == name);
         let of_triads = PerSensor::from_fn(|sensor| {
@@ -188,7 +189,7 @@ fn varies(values: &[f64]) -> bool {
     first.is_some_and(|first| values.any(|value| value != first))
 }
 
-/// Name of the first column called a time whose number never changes, and the number.
+/// Name and value of the first column that has the name of a time but never changes.
 pub fn standing_time(sheet: &Sheet) -> Option<(&str, f64)> {
     let mut columns = sheet.names.iter().zip(&sheet.columns);
     let stands = |(name, values): &(&String, &Vec<f64>)| {
@@ -262,7 +263,7 @@ fn forward(values: impl Iterator<Item = f64>) -> (f64, f64) {
     (forward / f64::max(steps, 1.0), back / f64::max(steps, 1.0))
 }
 
-/// The column with the most time-like name, otherwise the first increasing one.
+/// The column whose name is most like a time, otherwise the first increasing column.
 fn time(sheet: &Sheet, names: &[Name], forward: impl Fn(usize) -> (f64, f64)) -> Option<usize> {
     let goes_on = |k: &usize| match forward(*k) {
         (forward, _) if forward >= FORWARD => true,
@@ -272,13 +273,13 @@ fn time(sheet: &Sheet, names: &[Name], forward: impl Fn(usize) -> (f64, f64)) ->
     };
     let rank = |k: &usize| {
         let is_text = sheet.units[*k] == "h:m:s";
-        // Raw ticks behind times that have a unit.
+        // Raw ticks rank after times that have a unit.
         let is_raw = names[*k].unit.is_some_and(|unit| unit.word == "count");
         let named = names[*k].is_time().saturating_sub(u8::from(is_raw));
         (named, names[*k].is_of_time() && !is_text, names.len() - k)
     };
     let best = (0..names.len()).filter(goes_on).max_by_key(rank)?;
-    // The angle of an integrating sensor goes forward, too, and a temperature that rises.
+    // The angle of an integrating sensor and a rising temperature also increase steadily.
     let name = &names[best];
     let named_otherwise = name.is_time() == 0 && (name.sensor().is_some() || name.is_temperature());
     (!named_otherwise).then_some(best)
@@ -343,7 +344,7 @@ fn by_numbers(
     let mut free: Vec<usize> = (0..names.len()).filter(is_free).collect();
     let mut sizes = magnitudes(&free);
     if even(&sizes, EVEN).is_none() {
-        // Constants may stand between triads.
+        // Constant columns may be between triads.
         free.retain(varies);
         sizes = magnitudes(&free);
     }
@@ -352,12 +353,12 @@ fn by_numbers(
         let of = |k: &usize| sizes[*k].1.0;
         let all = (0..sizes.len()).filter(|_| is_pair);
         let least = || all.min_by(|a, b| of(a).total_cmp(&of(b)));
-        // A compass usually stands behind them.
+        // A compass usually comes after them.
         let best = even(&sizes, EVEN).or_else(least).or(even(&sizes, UNEVEN));
         found.accel.extend(best.map(|k| sizes.remove(k).0));
     }
     if found.gyro.is_empty() {
-        // Of several, the gyro is usually beside the accelerometer.
+        // If there are several, the gyro is usually next to the accelerometer.
         let place = found.accel.first().map_or(0, |accel| accel[0]);
         sizes.sort_by_key(|(triad, (_, lively))| (*lively < LIVELY, triad[0].abs_diff(place)));
         found.gyro.extend(sizes.iter().map(|(triad, _)| *triad));

@@ -17,10 +17,10 @@ const ACCEL_FILE: &str = "accelerometers.csv.gz";
 
 impl Draft {
     /// Writes the streams of the instrument as text, with this draft for them, into an existing directory; a damaged
-    /// log only if its intact part is to be used.
+    /// log is written only if its intact part is to be used.
     ///
     /// # Errors
-    /// [`FileError`] if the log is text already, is damaged, or cannot be read or written.
+    /// [`FileError`] if the log is already text, is damaged, or cannot be read or written.
     pub fn convert(mut self, log: &Path, directory: &Path, salvage: bool) -> Result<(), FileError> {
         let streams = self.streams.as_mut().filter(|of| of.written.is_none());
         let Some(streams) = streams else {

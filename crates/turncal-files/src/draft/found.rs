@@ -87,7 +87,8 @@ impl Draft {
         Some([what.to_owned(), why, advice.to_owned()])
     }
 
-    /// Units that are neither known nor whole counts: a rate or a unit may be wrong that only turns and gravity show.
+    /// Units that are neither known nor whole counts: perhaps a rate or unit that only turns and gravity can check is
+    /// wrong.
     pub(crate) fn doubts(&self) -> impl Iterator<Item = String> + '_ {
         Sensor::ALL.into_iter().filter_map(|sensor| {
             let unit = self.quantities.units.get(sensor);

@@ -43,7 +43,7 @@ const AXES_OF_PROGRAM: &str = "axis convention of the program that wrote the log
 /// Information in a log about the instrument and its recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Draft {
-    /// For a log of streams, their content.
+    /// Content of the streams, if the log has streams.
     streams: Option<Streams>,
     /// The column that distinguishes several instruments, with the number of the selected one.
     instance: Option<(usize, f64)>,
@@ -108,10 +108,11 @@ impl Draft {
         Ok(Self::of_sheet(sheet, None, stated))
     }
 
-    /// Examines two files of rows, of gyros and of accelerometers. `accel_name` is the name of the latter in the draft.
+    /// Examines two files of rows, one of gyros and one of accelerometers. `accel_name` is the name of the second file
+    /// in the draft.
     ///
     /// # Errors
-    /// [`FileError`] if one cannot be read, has hardly any rows or lacks its triad or its time.
+    /// [`FileError`] if a file cannot be read, has too few rows, or lacks its triad or its time.
     pub fn of_two_files(
         gyro: &DataFile,
         accel: &DataFile,
@@ -198,7 +199,8 @@ impl Draft {
         self.motion = Some(motion);
     }
 
-    /// Whether the columns of gyros hold gravity, and those of accelerometers its turns, and not as they are named.
+    /// Whether the triads are swapped: gravity is in the columns named as gyros, its rotation in those named as
+    /// accelerometers.
     fn are_exchanged(&self, rows: &RawSamples, sheet: &Sheet) -> bool {
         let shown = |of: &Quantities| of.units.get(Sensor::Accel).is_shown;
         let both = |of: &Quantities| {
@@ -256,7 +258,7 @@ pub fn turned_angle(triads: PerSensor<Vec<Vector3<f64>>>, period: f64) -> Option
     RawSamples::new(triads, Vec::new(), period).motion().angle
 }
 
-/// Keeps the rows of one of several instruments, and returns the column and number.
+/// Keeps the rows of one of several instruments; returns the column and the number that identify it.
 fn retain_instance(sheet: &mut Sheet) -> Option<(usize, f64)> {
     let (column, number) = columns::instance(sheet)?;
     sheet.retain(|of, row| of.columns[column][row] == number);
@@ -265,14 +267,14 @@ fn retain_instance(sheet: &mut Sheet) -> Option<(usize, f64)> {
 
 /// Keeps the rows in which a triad has a value.
 fn retain_samples(sheet: &mut Sheet, columns: &Columns) {
-    // Rows of another sensor have nothing in them.
+    // Rows of another sensor have no values in these columns.
     let triads = [columns.triads.gyro, columns.triads.accel];
     let of_triads: Vec<usize> = triads.into_iter().flatten().flatten().collect();
     let Some(time) = columns.time.filter(|_| !of_triads.is_empty()) else {
         return;
     };
     sheet.retain(|of, row| of.has(&of_triads, row));
-    // A row that is there twice is one sample.
+    // A repeated row is one sample.
     let of_samples = [&of_triads[..], &[time]].concat();
     sheet.retain(|of, row| {
         let is_new = |&k: &usize| of.columns[k][row] != of.columns[k][row - 1];

@@ -14,9 +14,9 @@ use turncal::units::DEGREE;
 pub const WINDOW: f64 = 0.25;
 /// Windows at rest differ by less than this many σ of their noise, plus a fraction.
 const SIGMAS: f64 = 6.0;
-/// This fraction of gravity or of the fastest turn.
+/// Fraction of gravity, or of the fastest turn, that is added to this limit.
 const PART: f64 = 1e-3;
-/// Samples on either side of a cut.
+/// Number of samples compared on either side of a cut.
 const BESIDE: usize = 8;
 /// The gravity direction jumps by this much at a cut, rad.
 const CUT: f64 = 30.0 * DEGREE;
@@ -24,7 +24,7 @@ const CUT: f64 = 30.0 * DEGREE;
 const STEADY: f64 = 5.0 * DEGREE;
 /// Step of the integration of the gravity direction, s.
 pub const FOLLOWED: f64 = 0.08;
-/// Specific force within this fraction of gravity gives its direction.
+/// Specific force gives the direction of gravity if its magnitude is within this fraction of gravity.
 const NEAR_GRAVITY: f64 = 0.1;
 /// Scale tolerance of data sheets.
 pub const TOLERANCE: f64 = 0.03;
@@ -38,7 +38,7 @@ pub struct Motion {
     pub longest_rest: Range<usize>,
     /// Specific force at rest, in the quantity of the file per row.
     pub gravity: f64,
-    /// Gyros at rest.
+    /// Mean gyro output at rest.
     pub rest: Vector3<f64>,
     /// Whether the gravity direction changes.
     pub is_turned: bool,
@@ -90,7 +90,7 @@ impl Motion {
         let stretches = stretches(&at_rest);
         let longest = stretches.iter().max_by_key(|of| of.len());
         let longest = longest.cloned().unwrap_or(0..0);
-        // At its ends a rest is already or still a motion.
+        // The ends of a rest interval still contain motion.
         let long = stretches.iter().filter(|of| of.len() > 3);
         let settled = long.map(|of| (of.start + 1) * length..(of.end - 1) * length);
         let settled: Vec<Range<usize>> = settled.collect();
@@ -145,7 +145,7 @@ fn intervals(
     both.map(interval).collect()
 }
 
-/// Runs of windows at rest.
+/// Sequences of windows at rest.
 fn stretches(at_rest: &[bool]) -> Vec<Range<usize>> {
     let mut found = Vec::new();
     let mut begin = 0;
@@ -158,7 +158,7 @@ fn stretches(at_rest: &[bool]) -> Vec<Range<usize>> {
     found
 }
 
-/// Whether samples are missing between these.
+/// Whether samples are missing between these two.
 fn is_broken(breaks: &[usize], samples: &Range<usize>) -> bool {
     let after = breaks.partition_point(|&next| next <= samples.start);
     breaks.get(after).is_some_and(|&next| next < samples.end)
@@ -192,7 +192,7 @@ fn turn_about(axis: &Vector3<f64>, gyro: &[Vector3<f64>]) -> bool {
     let (before, others) = rates.split_at(BESIDE);
     let (between, after) = others.split_at(2 * BESIDE);
     let variance = 0.5 * (before.variance() + after.variance());
-    // As many samples are between as beside.
+    // There are as many samples in the middle as on both sides together.
     let sigma = (2.0 * variance / (2 * BESIDE) as f64).sqrt();
     let change = between.mean() - 0.5 * (before.mean() + after.mean());
     let degrees = (2 * BESIDE - 2) as f64;
@@ -207,7 +207,7 @@ fn sum_variance(samples: &PerSensor<Vec<Vector3<f64>>>, settled: &[Range<usize>]
             let values: Vec<f64> = triad[stretch.clone()].iter().map(|row| row[axis]).collect();
             let sums = values.chunks_exact(SUM).map(|part| part.iter().sum());
             let sums: Vec<f64> = sums.collect();
-            // Differences of neighbours are free of what wanders.
+            // Differences between neighbours do not contain slow drift.
             let differences = sums.windows(2).map(|pair| pair[1] - pair[0]);
             of_one += differences.len() as f64 * values.population_variance();
             of_sums += differences.map(|of| of.powi(2)).sum::<f64>();

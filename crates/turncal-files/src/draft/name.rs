@@ -11,7 +11,7 @@ pub struct Unit {
     pub of: Of,
 }
 
-/// Parts of names of triad columns, and whole names.
+/// Parts of triad column names, and whole names.
 #[rustfmt::skip]
 const TRIADS: [(Sensor, &[&str], &[&str]); 2] = [
     (
@@ -26,7 +26,7 @@ const TRIADS: [(Sensor, &[&str], &[&str]); 2] = [
         &["a", "f", "fb", "sf", "dv", "force", "gf"],
     ),
 ];
-/// Parts of names of other columns.
+/// Parts of the names of other columns.
 #[rustfmt::skip]
 const OTHERS: [&str; 9] =
     ["mag", "compass", "quat", "euler", "cov", "std", "bias", "orientation", "useracc"];
@@ -100,7 +100,7 @@ impl Name {
             match found {
                 // `%float(RawGyroX)`
                 None if within.axis.is_some() && within.sensor().is_some() => return within,
-                // An index is no unit.
+                // An index is not a unit.
                 None if inside.chars().all(|c| c.is_ascii_digit()) => {}
                 _ => rest = name[..open].to_owned(),
             }
@@ -133,7 +133,7 @@ impl Name {
         }
     }
 
-    /// The triad that the stem names; a unit of the other triad decides between them.
+    /// The triad according to the stem; if the stem fits both, the unit decides.
     pub fn sensor(&self) -> Option<Sensor> {
         if self.is_of_another_sensor() {
             return None;
@@ -150,7 +150,7 @@ impl Name {
             })
     }
 
-    /// Whether its name belongs to neither gyro nor accelerometer.
+    /// Whether the name belongs to neither a gyro nor an accelerometer.
     pub fn is_of_another_sensor(&self) -> bool {
         let is_magnetic = |unit: Unit| ["uT", "gauss"].contains(&unit.word);
         self.unit.is_some_and(is_magnetic) || OTHERS.iter().any(|other| self.stem.contains(other))
@@ -161,7 +161,7 @@ impl Name {
         let whole = self.whole();
         let has = |parts: &[&str]| parts.iter().any(|part| whole.contains(part));
         let is = |all: &[&str]| all.contains(&&*whole);
-        // The instrument's own time before that of whoever received it.
+        // The time of the instrument takes precedence over that of the receiver.
         let ends = ["headerstamp", "timestampsample"];
         if ends.iter().any(|end| whole.ends_with(end)) || whole == "sample" && self.is_of_time() {
             4
@@ -184,7 +184,7 @@ impl Name {
         parts.iter().any(|part| whole.contains(part)) || ["n", "i", "k", "id"].contains(&&*whole)
     }
 
-    /// Whether its unit is one of time.
+    /// Whether the unit is a unit of time.
     pub fn is_of_time(&self) -> bool {
         self.unit.is_some_and(|unit| unit.of == Of::Time)
     }

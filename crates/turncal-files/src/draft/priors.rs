@@ -1,4 +1,4 @@
-//! Prior: scale and bias from the recording, the rest typical for the class of its noise.
+//! Prior: scale and bias from the recording; the rest is typical of instruments with similar noise.
 
 use nalgebra::Vector3;
 
@@ -20,13 +20,13 @@ struct Class {
     velocity_random_walk: f64,
     scale_ppm: f64,
     installation: f64,
-    /// rad/s.
+    /// 1σ of the gyro bias, rad/s.
     gyro_bias: f64,
-    /// m/s².
+    /// 1σ of the accelerometer bias, m/s².
     accel_bias: f64,
 }
 
-/// Largest bias, in σ of a class, of an instrument of that class.
+/// Largest bias of an instrument of a class, in σ of that class.
 const BEYOND: f64 = 3.0;
 
 #[rustfmt::skip]
@@ -50,7 +50,7 @@ const CLASSES: [Class; 3] = [
 ];
 
 impl Class {
-    /// From the white noise of the gyros, otherwise of the accelerometers.
+    /// Class according to the white noise of the gyros, otherwise of the accelerometers.
     fn of(walk: impl Fn(Sensor) -> Option<f64>) -> &'static Self {
         let is_of = |class: &&Class| match (walk(Sensor::Gyro), walk(Sensor::Accel)) {
             (Some(walk), _) => walk < class.angle_random_walk,

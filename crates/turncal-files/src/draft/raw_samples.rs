@@ -11,9 +11,9 @@ const CODES: f64 = 65_536.0;
 /// Rows of both triads minus the nominal register zero.
 pub struct RawSamples {
     pub triads: PerSensor<Vec<Vector3<f64>>>,
-    /// Rows after a gap.
+    /// Indices of rows that follow a gap.
     pub breaks: Vec<usize>,
-    /// s
+    /// Sample period, s.
     pub period: f64,
     /// Whether the rows are whole numbers.
     pub whole: PerSensor<bool>,
@@ -47,7 +47,7 @@ impl RawSamples {
         Motion::find(&self.triads, &self.breaks, self.period)
     }
 
-    /// The motion if gyros were accelerometers, and accelerometers gyros.
+    /// The motion if the two triads were swapped.
     pub fn exchanged(&self) -> Motion {
         let PerSensor { gyro, accel } = &self.triads;
         let triads = PerSensor {
@@ -79,7 +79,7 @@ impl RawSamples {
     }
 }
 
-/// Half the range of a register of whole numbers whose zero is in its middle, where all values lie about that.
+/// Half the range of a register of whole numbers with its zero in the middle, if all values are around this middle.
 pub fn offset(samples: &[Vector3<f64>]) -> Option<f64> {
     let values = || samples.iter().flat_map(|sample| sample.iter().copied());
     if values().any(|value| value.fract() != 0.0) {
@@ -89,7 +89,7 @@ pub fn offset(samples: &[Vector3<f64>]) -> Option<f64> {
         values().fold(f64::INFINITY, f64::min),
         values().fold(0.0, f64::max),
     );
-    // Of 12, 14, 16, 20, 24 and 32 bits.
+    // Register sizes are 12, 14, 16, 20, 24 and 32 bits.
     let halves = [11, 13, 15, 19, 23, 31].map(|bits| 2f64.powi(bits));
     let lies_about = |half: &f64| low >= 0.0 && low < *half && high > *half && high < 2.0 * half;
     let half = halves.into_iter().find(lies_about)?;
@@ -97,7 +97,7 @@ pub fn offset(samples: &[Vector3<f64>]) -> Option<f64> {
     ((mean / half - 1.0).abs() < 0.5).then_some(half)
 }
 
-/// Whether signed 16-bit numbers were written as unsigned, which is corrected: small negative numbers then appear just
+/// Whether signed 16-bit numbers were written as unsigned; this is corrected. Small negative numbers then appear just
 /// below 65536, and the signal is smoother with them below zero.
 fn unwrap(samples: &mut [Vector3<f64>]) -> bool {
     let mut values = samples.iter().flat_map(|sample| sample.iter());

@@ -33,7 +33,7 @@ pub struct Streams {
     pub axes: Option<&'static str>,
     /// The first damage.
     pub damage: Option<FileError>,
-    /// The file of the accelerometers, where both triads are rows of text.
+    /// The accelerometer file, if both triads are rows of text.
     pub written: Option<Written>,
 }
 
@@ -113,7 +113,7 @@ impl Streams {
         Ok(Some((streams, sheet)))
     }
 
-    /// Examines the files of both triads, as written by phones and `ulog2csv`, possibly one file with separate rows; a
+    /// Examines the files of both triads, as written by phones and `ulog2csv`, or one file with separate rows; a
     /// separate accelerometer file has this name in the draft.
     pub fn of_two_files(
         gyro: &DataFile,
@@ -251,7 +251,7 @@ impl Member {
         let unit = time::Clock::find(&sheet, &mut columns).unit;
         let stem = file.file_stem().unwrap_or_default().to_string_lossy();
         let mut found = rows_as_stream(&stem, &sheet);
-        // As PX4's ulog2csv calls its files.
+        // File names as written by PX4's ulog2csv.
         let topics = ["sensor_gyro_", "sensor_accel_"];
         let is_of_px4 = topics.iter().any(|topic| stem.contains(topic));
         found.stream.axes = is_of_px4.then_some("frd");
@@ -333,12 +333,12 @@ fn chosen(members: &[Member], wanted: Option<&str>) -> Option<(usize, Option<usi
         Some(name) => members[k].found.stream.name == name,
         None => members[k].found.stream.is_inertial && samples(Some(k)) >= FEWEST_ROWS as u64,
     };
-    // Of equal ones the first.
+    // If there are equal ones, the first.
     let longest = |is: &dyn Fn(usize) -> bool| {
         let all = (0..members.len()).rev().filter(|&k| is(k));
         all.max_by_key(|&k| samples(Some(k)))
     };
-    // Streams are put together by their times.
+    // Streams are combined by their times.
     let has = |of: &Member, sensor| of.time.is_some() && of.triads.get(sensor).is_some();
     let with = |sensor| longest(&|k| is_meant(k) && has(&members[k], sensor));
     let both = longest(&|k| is_meant(k) && members[k].is_of_both());
@@ -359,7 +359,7 @@ fn chosen(members: &[Member], wanted: Option<&str>) -> Option<(usize, Option<usi
 fn names(found: &Found) -> Vec<String> {
     let columns = found.stream.columns.iter();
     let bare: Vec<String> = columns.map(|column| column.name.clone()).collect();
-    // Numbers of columns behind the name of a stream would be numbers of axes.
+    // Column numbers after the name of a stream would look like axis numbers.
     let is_number = |name: &String| name.bytes().all(|of| of.is_ascii_digit());
     if bare.iter().any(|name| Name::of(name).sensor().is_some()) || bare.iter().all(is_number) {
         return bare;
@@ -383,7 +383,7 @@ fn tagged(file: &DataFile) -> Result<Vec<Member>, FileError> {
         let time = columns.time.map(|k| &member.found.stream.columns[k]);
         member.time = time.map(|column| (column.name.clone(), column.unit.to_owned()));
         member.triads = columns.triads;
-        // The tag may say what names do not.
+        // The tag may identify a triad if the names do not.
         if columns.by_size
             && !member.is_of_both()
             && let Some(sensor) = Name::of(&tag).sensor()

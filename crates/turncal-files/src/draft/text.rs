@@ -82,7 +82,7 @@ impl Draft {
         let mut imu = ImuFile {
             file: file.to_owned(),
             output: found.output,
-            // A rate that is asked for first may tell the units.
+            // The rate is requested first, because it may determine the units.
             sample_period_s: self.period(remarks),
             gyro_unit: self.unit(Sensor::Gyro, remarks),
             accel_unit: self.unit(Sensor::Accel, remarks),
@@ -141,7 +141,7 @@ impl Draft {
         let (path, clock) = ("imu.sample_period_s", &self.clock);
         let Some(period) = clock.period else {
             if !self.rows_show_period() {
-                let why = "seconds between rows, which a counter does not give";
+                let why = "seconds between rows; a counter does not give them";
                 remarks.open(path, why);
             }
             return None;
@@ -177,7 +177,8 @@ impl Draft {
         }
     }
 
-    /// Whether rows without a time show how long they last: rates, whose sums are angles.
+    /// Whether rows without a time show their duration: they do if they are rates, because the sums of rates are
+    /// angles.
     fn rows_show_period(&self) -> bool {
         let gyro = &self.quantities.units.gyro;
         self.columns.time.is_none()
@@ -281,7 +282,7 @@ impl Draft {
     fn without_time(&self, remarks: &mut Remarks) {
         let (path, why) = ("imu.columns", &self.clock.why);
         let instead = if self.clock.is_stated {
-            "rows are taken as consecutive."
+            "turncal takes the rows as consecutive."
         } else if self.rows_show_period() {
             "the sample period is estimated from the turns unless sample_period_s is set."
         } else {

@@ -22,12 +22,12 @@ pub enum Certainty {
     Certain,
     /// Stated in the log or typical, but not confirmed by motion.
     Guess,
-    /// Neither.
+    /// Neither stated nor confirmed.
     Unknown,
 }
 
 impl Certainty {
-    /// Word.
+    /// The certainty in one word.
     pub fn word(self) -> &'static str {
         match self {
             Self::Certain => "certain",
@@ -82,7 +82,7 @@ impl Clock {
             (None, "steps of one, as in a sample counter".to_owned())
         } else if let Some((second, period)) = known.and_then(|period| {
             let is_near = |second: &f64| (steps.mean * second / period).ln().abs() < STATED.ln();
-            // Ticks of a clock of its own.
+            // Ticks of the log's own clock.
             let own = || steps.is_whole.then(|| period / steps.mean);
             let tick = name.tick().filter(is_near).or_else(own);
             Some((seconds().find(is_near).or(tick)?, period))
@@ -112,7 +112,7 @@ impl Clock {
         }
     }
 
-    /// Samples, among these rows of this period, that follow a gap longer than `seconds`.
+    /// Indices of the samples that follow a gap longer than `seconds`.
     pub fn breaks(&self, rows: &[usize], period: f64, seconds: f64) -> Vec<usize> {
         let long = |gap: &&Gap| gap.missing * period > seconds;
         let first = |gap: &Gap| rows.partition_point(|&row| row < gap.before);
@@ -148,9 +148,9 @@ impl Clock {
 /// A step longer than the usual one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Gap {
-    /// The row after it.
+    /// The row after the step.
     before: usize,
-    /// The rows that are missing.
+    /// Number of missing rows.
     missing: f64,
 }
 
@@ -173,7 +173,7 @@ impl Steps {
         let is_whole = forward.iter().all(|step| step.fract() == 0.0);
         let repeated = steps().filter(|&step| step <= 0.0).count();
         let usual = median(&mut forward).unwrap_or(1.0);
-        // A clock that goes back begins again, or was set.
+        // A clock that steps back was restarted or set.
         let goes_on = |time: &mut f64, step: f64| {
             *time += if step < 0.0 { usual } else { step.max(0.0) };
             Some(*time)

@@ -10,11 +10,11 @@ use turncal::units::DEGREE;
 pub const ENOUGH: f64 = 20.0 * DEGREE;
 /// The shortest move that changes the gravity direction is at most two turns.
 const MOST: f64 = 2.0 * TAU;
-/// Moves this many times as long are not used, because a small error of the unit is a large error of their angle.
+/// Moves longer by this factor are not used, because in them a small error of the unit causes a large angle error.
 const LONG: f64 = 4.0;
 /// Successive trials differ by this factor.
 const STEP: f64 = 1.03;
-/// Parts of this factor that are tried about the best.
+/// Number of subdivisions of this factor that are tried around the best.
 const FINER: i32 = 20;
 /// Trials within this factor of the best count as the best.
 const SAME: f64 = 1.25;
@@ -38,12 +38,12 @@ pub struct Interval {
 struct Move<'a> {
     /// Gravity direction before the move.
     up: Vector3<f64>,
-    /// Up to the first interval of the next dwell.
+    /// Intervals up to the first one of the next dwell.
     intervals: &'a [Interval],
 }
 
 impl Move<'_> {
-    /// Length of the path of rotation.
+    /// Total rotation along the path.
     fn length(&self) -> f64 {
         self.intervals.iter().map(|of| of.rotation.norm()).sum()
     }

@@ -72,7 +72,7 @@ impl Quantities {
     ) -> Self {
         let mut found = Self::unknown();
         found.opposed = motion.angle.is_some_and(|angle| angle < 0.0);
-        // The accelerometers tell what rows hold.
+        // The accelerometers show which quantity the rows contain.
         for sensor in [Sensor::Accel, Sensor::Gyro] {
             let first = columns.triads.get(sensor).map(|triad| triad[0]);
             let named = |k: usize| Name::of_column(&sheet.names[k], &sheet.units[k]).unit;
@@ -144,7 +144,8 @@ impl Quantities {
         self.output = output;
         self.output_why = match output {
             Output::Pulse => {
-                "integer counts that carry their remainder, as pulse outputs do".into()
+                "integer counts whose remainder is carried into the next row, as in pulse outputs"
+                    .into()
             }
             Output::Increment => {
                 let period = rounded(rows.period, 4);
@@ -186,7 +187,7 @@ impl Quantities {
         let row = self.row(rows.period);
         let is_bare = !rows.whole && rows.named.is_none();
         match angle {
-            // Without a clock each unit needs a period of its own.
+            // Without a clock, each unit implies its own sample period.
             Some(angle) if !row.is_finite() && is_bare => {
                 let Some((word, period)) = usual_period(all, angle) else {
                     return Unit::open("cannot be estimated from turns without time stamps");
@@ -200,7 +201,7 @@ impl Quantities {
                     ..Unit::open(&why)
                 };
             }
-            // No unit fits at a rate that nothing but a statement shows, and one does at another.
+            // No unit fits at the rate, which is only stated, but one fits at another rate.
             Some(angle) if is_bare && rows.is_stated && row.is_finite() => {
                 if let Some((word, period)) = usual_period(all, angle) {
                     let [stated, usual] = [rows.period, period].map(|of| rounded(of.recip(), 4));
@@ -226,7 +227,7 @@ impl Quantities {
             }
             None => why_count(rows, "no known unit fits the change of gravity direction"),
         };
-        // Rows add up to the angle.
+        // The sum of the rows is the angle.
         let measured = angle.map(|angle| row / angle);
         let measured = measured.filter(|scale| scale.is_finite());
         Unit {
@@ -299,7 +300,7 @@ impl Quantities {
         self.units.get(sensor).word == Some("count")
     }
 
-    /// Rows to rates.
+    /// Factor that converts rows to rates.
     pub fn per_second(&self, period: f64) -> f64 {
         match self.output {
             Output::Rate => 1.0,
@@ -312,7 +313,7 @@ impl Quantities {
         period * self.per_second(period)
     }
 
-    /// The file's quantity per second for one rad/s or m/s², if it is known.
+    /// The file's quantity per second for one rad/s or m/s², if known.
     pub fn scale(&self, sensor: Sensor) -> Option<f64> {
         let unit = self.units.get(sensor);
         let measured = unit.scale.as_ref().map(|scale| scale.value);
@@ -320,7 +321,7 @@ impl Quantities {
     }
 }
 
-/// A unit that the file states as a multiple of one in `run.toml`, unless motion contradicts it.
+/// Unit stated in the file as a multiple of a unit of `run.toml`, unless motion contradicts it.
 fn scaled(sensor: Sensor, rows: &TriadRows) -> Option<Unit> {
     let unit = rows.named?;
     let scale = Scale::of_unit(sensor, unit)?;
@@ -346,7 +347,7 @@ fn why_count(rows: &TriadRows, unfit: &str) -> String {
     }
 }
 
-/// The only unit that gives a usual period for rows with this rotation, and the period.
+/// The only unit for which rows with this rotation have a usual period, and this period.
 fn usual_period(all: &[Hypothesis], angle: f64) -> Option<(&'static str, f64)> {
     let periods = all.iter().map(|of| (of.word, of.per_si * angle));
     let mut usual = periods.filter(|(_, period)| PERIODS.contains(period));

@@ -1,4 +1,4 @@
-//! Calibrations of programs: one matrix and one offset per triad, and their residual errors.
+//! Calibrations as other programs apply them: one matrix and one offset per triad, and the residual errors.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -6,19 +6,19 @@ use super::values::{Normalised, Values};
 use turncal::imu::{PerSensor, Sensor};
 use turncal::units::{ARCSEC, DEGREE, PPM, STANDARD_GRAVITY};
 
-/// The calibrated value of a program, `matrix (n − offset)`.
+/// The calibrated value computed by a program, `matrix (n − offset)`.
 pub struct Affine {
     pub matrix: Matrix3<f64>,
     pub offset: Vector3<f64>,
 }
 
 impl Affine {
-    /// Subtracts an offset only.
+    /// A program that only subtracts an offset.
     pub fn offset(offset: Vector3<f64>) -> Self {
         Self::diagonal(Vector3::repeat(1.0), offset)
     }
 
-    /// A factor and an offset per axis.
+    /// A program with a factor and an offset per axis.
     pub fn diagonal(factor: Vector3<f64>, offset: Vector3<f64>) -> Self {
         let matrix = Matrix3::from_diagonal(&factor);
         Self { matrix, offset }
@@ -60,7 +60,7 @@ impl Residual {
         Sensor::ALL.into_iter().map(of).filter(exceeds).collect()
     }
 
-    /// Size, in a sentence.
+    /// Size of the residual error, as a sentence.
     pub fn words(&self) -> String {
         let scale = self.errors.diagonal().amax();
         let mut across = self.errors;

@@ -1,4 +1,4 @@
-//! Parameters of PX4, ArduPilot, Betaflight and INAV: offsets, and scales of accelerometers.
+//! Parameters for PX4, ArduPilot, Betaflight and INAV: offsets, and accelerometer scales.
 //!
 //! PX4 and ArduPilot compute `(n − offset) ⊙ scale` for accelerometers and `n − offset` for gyros, in sensor axes, and
 //! then rotate to body axes (`SENS_BOARD_ROT`, `AHRS_ORIENTATION`). INAV and Betaflight do the same in whole counts.
@@ -32,7 +32,7 @@ const INAV_ONE: f64 = 4096.0;
 /// Names with values.
 type Parameters = Vec<(String, f64)>;
 
-/// Offsets of both triads, and scales of the accelerometers, as far as numbers of 32 bits represent them.
+/// Offsets of both triads, and scales of the accelerometers, as represented by 32-bit numbers.
 fn single(values: &Values) -> PerSensor<Affine> {
     let rounded = |v: Vector3<f64>| v.map(|value| f64::from(value as f32));
     let PerSensor { gyro, accel } = &values.triads;
@@ -54,7 +54,7 @@ fn parameters(program: &PerSensor<Affine>, [gyro, offset, scale]: [&str; 3]) -> 
     gyros.chain(accel).collect()
 }
 
-/// Vehicle, component, name, value, type: 9 is a number of 32 bits, 6 a whole number.
+/// Vehicle, component, name, value, type (9: 32-bit floating point, 6: integer).
 fn px4_lines(parameters: Parameters) -> String {
     let line = |(name, value): (String, f64)| format!("1\t1\t{name}\t{:?}\t9\n", value as f32);
     parameters.into_iter().map(line).collect()
@@ -121,7 +121,7 @@ pub fn ardupilot(values: &Values) -> Exported {
         for (sensor, kind) in [(Sensor::Accel, "ACC"), (Sensor::Gyro, "GYR")] {
             let reference = thermal.range.get(sensor).reference;
             for (axis, [a, b, c]) in UPPER.iter().zip(values.triads.get(sensor).bias_powers) {
-                // Of a polynomial about the reference the same about 35 °C, except for a constant.
+                // Converts a polynomial about the reference to one about 35 °C, except for a constant.
                 let s = ARDUPILOT_REFERENCE - reference;
                 let about = [a + 2.0 * b * s + 3.0 * c * s * s, b + 3.0 * c * s, c];
                 let name = |k: usize| format!("INS_TCAL1_{kind}{k}_{axis}");
@@ -137,7 +137,7 @@ pub fn ardupilot(values: &Values) -> Exported {
     Remarks::of_program(values, reads, &program, &notes).above(&text)
 }
 
-/// A vector in whole counts.
+/// A vector rounded to whole counts.
 fn counts(v: &Vector3<f64>, per_unit: f64) -> Vector3<f64> {
     v.map(|value| (value * per_unit).round())
 }

@@ -57,9 +57,9 @@ accelerometers:
     remarks.defines([equations.to_owned(), frame]).above(&text)
 }
 
-/// Topic, rate and noise, which both programs require, each in a line after `indent`; and comments.
+/// Topic, rate and noise (required by both programs), each on a line after `indent`, and comments.
 fn configuration<'a>(values: &'a Values<'a>, program: &str, indent: &str) -> (String, Remarks<'a>) {
-    // cv::FileStorage takes a comment behind a text without quotes as part of the text.
+    // cv::FileStorage treats a comment after an unquoted text as part of the text.
     let mut text = format!("{indent}rostopic: \"/imu0\"\n");
     let mut missing = Vec::new();
     let mut key = |name: String, value: Option<f64>, unit: &str| match value {
@@ -104,7 +104,7 @@ type Split = (Matrix3<f64>, Matrix3<f64>);
 fn lower(a: &Matrix3<f64>) -> Split {
     let rotation = accelerometer_frame(a);
     let mut lower = a * rotation.transpose();
-    // Above the diagonal there is only rounding.
+    // The entries above the diagonal are only rounding errors.
     lower.fill_upper_triangle(0.0, 1);
     (lower, rotation)
 }

@@ -17,7 +17,7 @@ use turncal::units::{ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, HOUR, MILLIGAL, PPM};
 const M_PER_S_PER_SQRT_H: f64 = 1.0 / 60.0;
 
 pub fn write(values: &Values) -> Exported {
-    // `A_ij / A_ii`, the part of another axis' input that stays in the output.
+    // `A_ij / A_ii`, the part of the input along another axis that remains in the output.
     let misalignment = PerSensor::from_fn(|sensor| {
         let a = values.triads.get(sensor).sensitivity;
         Matrix3::from_fn(|i, j| if i == j { 0.0 } else { a[(i, j)] / a[(i, i)] })
@@ -63,7 +63,7 @@ initaccscale: {}  # ppm
         .above(&text)
 }
 
-/// 1σ of the initial values; the names of those that the calibration does not state for all axes are `unstated`.
+/// 1σ of the initial values; `unstated` receives the names of values that the calibration does not state for all axes.
 fn sigma(values: &Values, unstated: &mut Vec<&str>) -> String {
     let PerSensor { gyro, accel } = &values.triads;
     let all = [
@@ -84,7 +84,7 @@ fn sigma(values: &Values, unstated: &mut Vec<&str>) -> String {
     lines.concat()
 }
 
-/// Noise, if the white noise of both triads is known; otherwise all its names are `missing`.
+/// Noise, if the white noise of both triads is known; otherwise `missing` receives all its names.
 fn noise(values: &Values, missing: &mut Vec<String>) -> String {
     let PerSensor { gyro, accel } = &values.triads;
     let of = |triad: &Normalised| triad.density().zip(triad.varying());

@@ -43,7 +43,7 @@ pub fn write(values: &Values) -> Exported {
         }
         fields.push((sensor.name(), structure("", &of_triad)));
     }
-    // It is symmetric, so rows are columns.
+    // The matrix is symmetric, so rows equal columns.
     let covariance = values.record.covariance.concat();
     let size = values.record.covariance.len();
     fields.push(("covariance", numbers(size, &covariance)));
@@ -51,7 +51,7 @@ pub fn write(values: &Values) -> Exported {
     let mut file = vec![b' '; 124];
     let head = b"MATLAB 5.0 MAT-file, a calibration by turncal";
     file[..head.len()].copy_from_slice(head);
-    // No data of subsystems.
+    // No subsystem data.
     file[116..124].fill(0);
     file.extend([0x00, 0x01, b'I', b'M']);
     file.extend(structure("turncal", &fields));

@@ -1,6 +1,6 @@
 //! Exports for other programs: calibrated samples and calibrations.
 //!
-//! Every format defines `N` and `u` in comments and names its omissions.
+//! Every format defines `N` and `u` in comments and lists its omissions.
 
 mod affine;
 mod autopilot;
@@ -25,7 +25,7 @@ use turncal::run::Run;
 use values::Axes::{self, FrontRightDown, Log, RightFrontUp};
 use values::Values;
 
-/// A format of a calibration.
+/// An export format for a calibration.
 #[derive(Debug, Clone, Copy)]
 pub struct Format {
     /// Name on the command line.

@@ -2,13 +2,13 @@
 
 use nalgebra::{Dim, Matrix, RawStorage};
 
-/// A one-line comment for any text, because names and warnings come from files.
+/// Any text as a one-line comment; names and warnings come from files and may contain line breaks.
 pub fn comment(mark: &str, line: &str) -> String {
     let breaks = |c: char| c.is_control() || matches!(c, '\u{2028}' | '\u{2029}');
     let line = line.replace(breaks, " ");
     let line = line.trim_end();
     let blank = if line.is_empty() { "" } else { " " };
-    // In C a backslash at the end, or its trigraph ??/, would take the next line in.
+    // In C, a backslash at the end (or its trigraph ??/) would continue the comment on the next line.
     let end = if line.ends_with(['\\', '/']) { "." } else { "" };
     format!("{mark}{blank}{line}{end}\n")
 }

@@ -31,7 +31,7 @@ pub fn write(values: &Values) -> Exported {
         "the serial number after the table, which stays empty",
     ];
     let mut imu = vec![0xff; 37 * 4 + 96];
-    // Intrinsics are used, extrinsics are not.
+    // Intrinsics are set, extrinsics are not.
     imu[..4].copy_from_slice(&(1u32 << 8).to_le_bytes());
     let of_triad = |triad: &Affine, unit: f64| {
         let bias = triad.corrected_bias() / unit;

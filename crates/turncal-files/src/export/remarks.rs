@@ -13,7 +13,7 @@ pub const SIGMA: &str = "sigma and covariance of the parameters; they are in cal
 /// A calibration in a format.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Exported {
-    /// The file.
+    /// Text of the file.
     pub bytes: Vec<u8>,
     /// Omissions of the format, one sentence each, which are also in the file.
     pub notes: Vec<String>,
@@ -31,7 +31,7 @@ pub struct Remarks<'a> {
 }
 
 impl<'a> Remarks<'a> {
-    /// Comments that begin with `mark` and name these omissions and all error terms.
+    /// Comments that begin with `mark` and list these omissions and all error terms.
     pub fn new(values: &'a Values<'a>, mark: &'static str, omissions: &[&str]) -> Self {
         Self {
             values,
@@ -42,7 +42,7 @@ impl<'a> Remarks<'a> {
         }
     }
 
-    /// Comments for a program that computes `matrix (n − offset)`: the residual errors are omissions, too.
+    /// Comments for a program that computes `matrix (n − offset)`: the residual errors are listed as omissions too.
     pub fn of_program(
         values: &'a Values<'a>,
         (mark, reads): (&'static str, &str),
@@ -111,12 +111,12 @@ impl<'a> Remarks<'a> {
         lines.map(|line| comment(self.mark, &line)).collect()
     }
 
-    /// A file of these comments and a text.
+    /// A file that consists of these comments and a text.
     pub fn above(&self, text: &str) -> Exported {
         self.of_file((self.text() + text).into_bytes())
     }
 
-    /// A file that contains these comments in a form of its own, or nowhere.
+    /// A file that contains these comments in its own form, or not at all.
     pub fn of_file(&self, bytes: Vec<u8>) -> Exported {
         Exported {
             bytes,

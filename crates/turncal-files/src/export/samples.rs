@@ -20,26 +20,27 @@ pub const HEADER: &str = "start_s,end_s,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s,a
 const ROW_LENGTH: usize = 176;
 /// Rows that one task turns into text.
 const ROWS: usize = 4096;
-/// Tasks before their text is written.
+/// Number of tasks whose text is written at once.
 const TASKS: usize = 64;
 
 /// The samples of a run to write.
 #[derive(Debug, Clone, Copy)]
 pub struct Samples<'a> {
-    /// The run of the samples.
+    /// The run that contains the samples.
     pub run: &'a Run,
     /// Correction.
     pub correction: &'a Correction,
     /// Whether missing samples are also written, interpolated, with 1 in a column `filled`.
     pub fill: bool,
-    /// Verdict of the calibration, which names a last column.
+    /// Verdict of the calibration, used as the name of a last column.
     pub verdict: Option<Word>,
 }
 
 impl Samples<'_> {
     /// Writes one row per log row, with [`HEADER`] first; for a temperature-dependent calibration, `in_range` states
     /// whether it is valid at the temperature of the row. A row contains means over its sample, so the output is a log
-    /// with `output = "rate"` in `rad/s` and `m/s^2`. Numbers are the shortest that read as the same value.
+    /// with `output = "rate"` in `rad/s` and `m/s^2`. Numbers have the fewest digits that are read back as the same
+    /// value.
     pub fn rows(&self, file: &mut dyn Write) -> io::Result<()> {
         let optional = |is_there: bool, column| if is_there { column } else { "" };
         let in_range = optional(self.correction.changes(), ",in_range");

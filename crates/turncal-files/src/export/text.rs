@@ -19,7 +19,7 @@ pub fn write(values: &Values) -> Exported {
     }
     for (name, term) in &values.record.terms {
         let of_term = Term::parameter_named(name).and_then(Term::of);
-        // The others are the table's, all of them angles.
+        // The others are table parameters, all of them angles.
         let unit = of_term.map_or("rad", |term| term.entry().si_unit);
         lines.push(row(name, term.value, term.sigma, unit));
     }

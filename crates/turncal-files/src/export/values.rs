@@ -24,11 +24,11 @@ pub enum Axes {
 /// Every value of a calibration and, perhaps, a run of its instrument.
 pub struct Values<'a> {
     pub record: &'a Calibration,
-    /// In the unit of the record, along right, front, up.
+    /// Correction in the unit of the record, along right, front, up.
     pub correction: Correction,
-    /// From the axes of the format to right, front, up.
+    /// Axis order from the axes of the format to right, front, up.
     pub order: AxisOrder,
-    /// Along the axes of the format.
+    /// Triads along the axes of the format.
     pub triads: PerSensor<Normalised>,
     /// Gyro output per specific force, along the axes of the format.
     pub g_sensitivity: Matrix3<f64>,
@@ -90,8 +90,8 @@ impl<'a> Values<'a> {
         })
     }
 
-    /// The unit of `N`. A count may belong to a rate or, per second, to an increment; the record does not distinguish
-    /// the two.
+    /// The unit of `N`. A count may be one of a rate or, per second, one of an increment; the record does not
+    /// distinguish the two.
     pub fn unit(&self, sensor: Sensor) -> String {
         let unit = self.record.unit.as_ref();
         match unit.map(|unit| unit.get(sensor).as_str()) {
@@ -172,7 +172,7 @@ impl Normalised {
         Some(self.noise?.random_walk)
     }
 
-    /// Bias variation, and whether it is only the usual one for this white noise.
+    /// Bias variation, and whether it is only the usual variation for this white noise.
     pub fn varying(&self) -> Option<(GaussMarkov, bool)> {
         let noise = self.noise?;
         let usual = || (usual_variation(&noise), true);
@@ -180,7 +180,8 @@ impl Normalised {
     }
 }
 
-/// The noise of the run; a figure that the calibration refuted, or that no run states, as the calibration estimated it.
+/// The noise of the run. A figure that the calibration refuted, or that no run states, is replaced by the estimate of
+/// the calibration.
 fn noise(record: &Calibration, run: Option<&Run>, sensor: Sensor) -> Option<Noise> {
     let mut noise = run.map_or_else(Noise::default, |run| *run.instrument.noise.get(sensor));
     let report = record.noise.as_ref().map(|noise| &noise.report);

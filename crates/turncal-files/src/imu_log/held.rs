@@ -24,7 +24,7 @@ impl Default for Sizes {
 #[derive(Default)]
 pub struct Held {
     pub columns: [Vec<f64>; 6],
-    /// Rows before each duplicate, and its line.
+    /// Number of rows before each duplicate, and its line.
     pub duplicates: Vec<(usize, u64)>,
 }
 
@@ -38,7 +38,7 @@ impl Held {
     }
 
     pub fn insert(&mut self, place: usize, row: [f64; 6]) {
-        // Rows that come late belong behind one of the last.
+        // Late rows belong after one of the last rows.
         let last = self.len().saturating_sub(REACH);
         let behind = self.duplicates.iter_mut().rev();
         for (row, _) in behind.take_while(|(row, _)| *row > last) {

@@ -28,7 +28,7 @@ pub struct Parts<'a> {
     clock: Line,
     /// Sample number of each row in memory.
     numbers: Vec<usize>,
-    /// Rows in memory that were processed.
+    /// Number of rows in memory that were processed.
     taken: usize,
     /// The first unprocessed sample.
     next: usize,
@@ -50,7 +50,7 @@ impl<'a> Parts<'a> {
         (held, stamps): (&Held, &Stamps),
         known: Option<&Wander>,
     ) -> Result<Self, FileError> {
-        // Rows further on may belong before the last ones.
+        // Later rows may belong before the last ones.
         let open = if size.is_some() { REACH } else { 0 };
         let settled = &stamps.of_rows[..stamps.of_rows.len().saturating_sub(open)];
         let (clock, numbers) = Line::new(&log.source.file, settled, log.clock.period)?;
@@ -103,7 +103,7 @@ impl<'a> Parts<'a> {
         stamps: &mut Stamps,
         at_end: bool,
     ) -> Result<(), FileError> {
-        // Rows further on tell whether one is late.
+        // Later rows show whether a row is late.
         let new = &stamps.of_rows[self.numbers.len()..];
         let count = new.len() - if at_end { 0 } else { REACH.min(new.len()) };
         self.numbers.extend(self.clock.numbers(new, count)?);
@@ -149,7 +149,7 @@ impl<'a> Parts<'a> {
             self.next = until;
             return;
         }
-        // A part ends before a sound sample, so that nothing is bridged across.
+        // A part ends before a sample without faults, so that no bridge crosses the boundary.
         let wanted = end.saturating_sub(BESIDE).max(self.taken);
         let sound = |row: &usize| repaired.is_sound(self.numbers[*row]);
         let end = (wanted..end).find(sound).unwrap_or(wanted);
@@ -290,8 +290,7 @@ impl<'a> Parts<'a> {
         let PerSensor { gyro, accel } = self.series;
         let gyro = gyro.finish(seconds, layout.body_nominal(log, Sensor::Gyro));
         let accel = accel.finish(seconds, layout.body_nominal(log, Sensor::Accel));
-        // Pulses are rounded a second time where packed ones are interpolated: what is not whole there stays with the
-        // sum.
+        // Packed pulses are rounded a second time if they are interpolated; the fraction is carried over in the sum.
         let roundings: f64 = match log.output {
             Output::Pulse if gyro.is_packed() && !self.bridges.is_empty() => 2.0,
             _ => 1.0,

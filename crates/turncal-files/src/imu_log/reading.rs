@@ -62,7 +62,7 @@ impl<'a> Reading<'a> {
         {
             return Ok(());
         }
-        // Rows that another sensor wrote, or in which a sensor said nothing; a time tells that they are missing.
+        // Rows from another sensor, or without a value from a sensor; with a time column, they count as missing.
         let places = || self.places.iter().flatten();
         let blank = places().filter(|&&place| csv.is_blank(place)).count();
         if blank > 0 && self.log.clock_of_rows().column.is_some() {
@@ -104,7 +104,9 @@ impl<'a> Reading<'a> {
         let file = self.log.source.file.display();
         let blank = (self.blank > 0).then(|| {
             let rows = counted(self.blank, "row");
-            format!("turncal skipped {rows} of {file} with empty columns of both triads.")
+            format!(
+                "turncal skipped {rows} of {file} in which the columns of both triads are empty."
+            )
         });
         let lacking = (self.lacking > 0).then(|| {
             let rows = counted(self.lacking, "row");
@@ -178,7 +180,7 @@ impl ImuLog<'_> {
         self.read_by(Sizes::default(), notes)
     }
 
-    /// As [`Self::read`], with other limits for the rows in memory.
+    /// Does the same as [`Self::read`], with other limits for the rows in memory.
     pub fn read_by(&self, sizes: Sizes, notes: &mut Vec<String>) -> Result<ImuSamples, FileError> {
         let mut known = None;
         loop {
@@ -188,7 +190,7 @@ impl ImuLog<'_> {
             let parts = reading.all(&mut csv, &layout, sizes, known.as_ref())?;
             let clock = parts.clock().map_err(|error| csv.placed(error))?;
             if parts.are_packed() && known.is_none() && clock.wander.is_some() {
-                // Too long to be held: it is read again with the clock that it was found to have.
+                // Too long to be kept in memory: the file is read again with the clock found in the first reading.
                 known = clock.wander;
                 continue;
             }

@@ -28,7 +28,7 @@ pub struct ImuLog<'a> {
     pub axes: AxisOrder,
     pub stamp: TimeStamp,
     pub continuous: bool,
-    /// Along right-front-up.
+    /// Scale factors along right-front-up.
     pub nominal: PerSensor<Nominal>,
     /// Largest magnitude of a row value.
     pub full_scale: PerSensor<Option<f64>>,

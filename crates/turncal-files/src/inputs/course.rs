@@ -1,5 +1,5 @@
 //! Samples of a stream integrated over other intervals: between any times, or over the samples of a uniform clock if
-//! its own drifts.
+//! the clock of the stream drifts.
 
 use std::ops::Range;
 
@@ -29,12 +29,12 @@ impl Course {
         self.begin + self.len() as f64
     }
 
-    /// Integrals between two positions, and their squared fraction of the midway error; `None` if the positions are
-    /// outside or not in order.
+    /// Integral between two positions, and its squared error as a fraction of the midway error; `None` if the positions
+    /// are outside or not in order.
     pub fn between(&self, begin: f64, end: f64) -> Option<([f64; 3], f64)> {
         let place = |place: f64| {
             let place = place - self.begin;
-            // Times are sums of many periods, which rounding leaves beside their edges.
+            // Times are sums of many periods, so rounding moves them slightly off their edges.
             if (place - place.round()).abs() < SAME {
                 place.round()
             } else {
@@ -52,7 +52,7 @@ impl Course {
             whole + beyond(sums, behind, to - behind as f64)
                 - beyond(sums, first, from - first as f64)
         });
-        // What a cubic through the edges at −1, 0, 1 and 2 misses is as this product.
+        // The error of a cubic through the edges at −1, 0, 1 and 2 is proportional to this product.
         let u = to - behind as f64;
         let weight = (1.0 + u) * u * (1.0 - u) * (2.0 - u) / MIDWAY;
         Some((sums, weight * weight))
@@ -65,10 +65,10 @@ impl Course {
 
     /// Mean square error of the integral midway between two edges.
     ///
-    /// Every second edge is omitted and interpolated from its neighbours, and every fourth one from those two away. The
-    /// squared error due to white noise, which the filter models, grows linearly with edge distance, and that of a
-    /// signal not followed by the cubic with its eighth power. The two parts can therefore be separated; the signal
-    /// part at the actual distance is 2⁻⁸ of that at twice the distance.
+    /// Every second edge is omitted and interpolated from its neighbours, and every fourth edge from those two edges
+    /// away. The squared error due to white noise (modelled by the filter) grows linearly with the edge distance; that
+    /// of a signal not followed by the cubic grows with its eighth power. The two parts can therefore be separated; the
+    /// signal part at the actual distance is 2⁻⁸ of that at twice the distance.
     pub fn edge_error(&self) -> [f64; 3] {
         self.sums.each_ref().map(|sums| {
             let missed = |apart: usize| {
@@ -84,7 +84,7 @@ impl Course {
                 }
                 squares / count.max(1) as f64
             };
-            // Edges apart by two and four samples.
+            // Edges that are two and four samples apart.
             let (near, far) = (missed(1), missed(2));
             let signal = ((far - 2.0 * near) / (256.0 - 2.0)).max(0.0);
             signal / 256.0
@@ -101,7 +101,7 @@ fn beyond(sums: &[f64], edge: usize, part: f64) -> f64 {
     if sums.len() < 3 {
         return sums[edge] * part;
     }
-    // Edges from the first of the four to the others.
+    // Differences from the first of the four edges to the others.
     let first = edge.saturating_sub(1).min(sums.len() - 3);
     let one = sums[first];
     let two = one + sums[first + 1];
@@ -142,7 +142,7 @@ impl Resampled {
         self.weights += weight;
         self.count += 1.0;
         Some(match self.output {
-            // Clocks that are one give values as they stand, to the last bit.
+            // If both clocks are the same, the values are returned unchanged, to the last bit.
             Output::Rate if (end - begin - 1.0).abs() > 1e-9 => sums.map(|sum| sum / (end - begin)),
             _ => sums,
         })
@@ -167,7 +167,7 @@ impl Resampled {
 
 /// Number of samples that the cubic extends beyond the last one.
 const AHEAD: f64 = 2.0;
-/// Number of samples that it extends backwards.
+/// Number of samples that the cubic extends before the first one.
 const BACK: usize = 2;
 
 /// Uniform samples of a triad, produced as drifting samples arrive.
@@ -180,8 +180,8 @@ pub struct Even {
     resampled: Resampled,
 }
 
-/// Edges of drifting samples relative to uniform samples, which start with the first whole one; stamps are `lag`
-/// samples after the start of a sample.
+/// Edges of drifting samples relative to uniform samples; the uniform samples start with the first whole one. Stamps
+/// are `lag` samples after the start of a sample.
 pub fn place(wander: &Wander, lag: f64, edge: usize) -> f64 {
     wander.time(edge as f64 - lag) + lag
 }

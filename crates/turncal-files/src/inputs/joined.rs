@@ -1,4 +1,4 @@
-//! Two streams with separate clocks, combined into rows of one.
+//! Two streams with separate clocks, combined into rows with one clock.
 //!
 //! Gyros are unchanged. Accelerometers are integrated over each gyro sample: their integral is known at the edges of
 //! their samples and interpolated by a cubic through four of them. The sum over samples is exact, so errors do not
@@ -81,7 +81,7 @@ fn columns_of_both(
     lag: f64,
 ) -> Vec<Vec<f64>> {
     let mut columns = vec![Vec::new(); 7 + gyro.further.len()];
-    // Against the accelerometers' first stamp: seconds since 1970 have no digits left for parts of samples.
+    // Relative to the first accelerometer stamp, because seconds since 1970 leave no digits for fractions of a sample.
     let ahead = gyro.clock.first - accel.clock.first;
     let place = |number: f64| accel.clock.number(ahead + gyro.clock.time(number)) + lag;
     let mut course = 0;
@@ -94,7 +94,7 @@ fn columns_of_both(
             course += 1;
         }
         let course = courses.get(course);
-        // Where one of both lacks samples, the row does.
+        // If one of the two lacks a sample, the row is missing.
         let Some(sample) = course.and_then(|course| resampled.sample(course, begin, end)) else {
             continue;
         };

@@ -19,9 +19,9 @@ pub fn read(
     let end_column = csv.column("end")?;
     let label_column = csv.column("label")?;
     let record = (imu.start(), imu.end());
-    // Stamps may name either end of a sample, so borders can be out by one, and are rounded.
+    // Stamps may refer to either end of a sample, so borders can be off by one sample; they are also rounded.
     let slack = 1.5 * imu.period;
-    // The first row at or after a time; times are printed rounded.
+    // The first row at or after a time, with a tolerance because printed times are rounded.
     let row = |time: f64| {
         let row = (imu.edge(time) - lag - 0.01).ceil();
         (row.max(0.0) as usize).min(imu.len())
@@ -56,7 +56,7 @@ pub fn read(
             label,
         });
     }
-    // A label that lacks letters is none, which is said elsewhere.
+    // A label without letters is not a label; this is reported elsewhere.
     notes.extend(csv.left_out());
     let cut_off = csv.cut_off("turncal used it");
     notes.extend(cut_off.filter(|_| label_column + 1 != csv.header().len()));

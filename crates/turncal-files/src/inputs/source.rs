@@ -7,7 +7,7 @@ use turncal_logs::clock::{Breaks, Clock, TimeUnit};
 use turncal_logs::{DataFile, Source};
 
 impl<'a> Fields<'a> {
-    /// The file of this name in `run.toml`.
+    /// The file with this name in `run.toml`.
     pub fn file(&self, name: &str) -> DataFile {
         DataFile::find(self.directory.join(name), self.in_memory)
     }

@@ -109,7 +109,7 @@ impl<'a> Fields<'a> {
         }
         if names.is_empty() && columns.quaternion.is_none() {
             let path = "turntable.columns.quaternion";
-            let meaning = "columns of a quaternion or of `angles`";
+            let meaning = "columns for `quaternion` or for `angles`";
             return Err(self.document.missing(path, meaning));
         }
         let axis = |letter: &String| LETTERS.iter().find(|(known, _)| known == letter);

@@ -11,7 +11,7 @@ const LARGEST: f64 = 100.0;
 /// Maximum number of spans of [`TEMPERATURE_SPACING`]: one year.
 const MOST_SPANS: f64 = 366.0 * 86_400.0;
 
-/// Settings in `run.toml`.
+/// Temperature settings in `run.toml`.
 pub struct TemperatureColumns<'a> {
     names: Vec<&'a str>,
     of: PerSensor<[usize; 3]>,
@@ -101,7 +101,7 @@ struct Channel {
     beyond: Option<(f64, u64)>,
 }
 
-/// Result of reading.
+/// Temperatures read from a file.
 pub struct Read {
     pub temperature: Option<Temperature>,
     pub facts: Option<TemperatureFacts>,

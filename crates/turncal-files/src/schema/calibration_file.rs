@@ -1,6 +1,6 @@
 //! `calibration.json` and `truth.json`: validated on reading, and on writing by the same checks.
 //!
-//! A failed calibration is written with values of any size, because its findings say that they must not be used.
+//! A failed calibration is written with values of any size, because its findings state that they must not be used.
 
 use std::collections::HashSet;
 use std::ops::RangeInclusive;

@@ -22,7 +22,7 @@ const FORMAT: &str = "turncal-campaign/1";
 pub struct Campaign {
     /// Name of its directory or file.
     pub name: String,
-    /// In order of name, independent of the order in the file.
+    /// Recordings in order of name, independent of the order in the file.
     pub runs: Vec<Run>,
     /// Common settings.
     pub together: Together,

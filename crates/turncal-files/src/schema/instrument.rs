@@ -21,7 +21,7 @@ use turncal_logs::clock::{Breaks, Clock};
 /// Default 1σ of scale factors, misalignments and biases, typical of consumer MEMS.
 pub const USUAL_SCALE: f64 = 50_000.0 * PPM;
 pub const USUAL_INSTALLATION: f64 = 2.0 * DEGREE;
-/// rad/s and m/s².
+/// Default 1σ of biases, rad/s and m/s².
 pub const USUAL_BIAS: PerSensor<f64> = PerSensor {
     gyro: 2.0 * DEGREE,
     accel: 1.0,
@@ -54,7 +54,7 @@ pub struct InstrumentFields<'a> {
 }
 
 impl<'a> Fields<'a> {
-    /// The fields of a document whose directory contains the files that it names.
+    /// The fields of a document; the files given in it are in its directory.
     pub fn new(document: Document<'a>, run: &'a RunFile, in_memory: &'a [DataFile]) -> Self {
         Self {
             document,

@@ -43,10 +43,9 @@ const COUNTRIES: &str = "AD AE AF AG AI AL AM AO AQ AR AS AT AU AW AX AZ BA BB B
     PT PW PY QA RE RO RS RU RW SA SB SC SD SE SG SH SI SJ SK SL SM SN SO SR SS ST SV SX SY SZ TC TD TF TG TH TJ TK TL \
     TM TN TO TR TT TV TW TZ UA UG UM US UY UZ VA VC VE VG VI VN VU WF WS YE YT ZA ZM ZW";
 
-/// Reads and checks a lab.toml. `meta` contains metadata of the run, which complete `[item]`.
+/// Reads and checks a lab.toml. `meta` contains metadata of the run, to complete `[item]`.
 ///
-/// # Errors
-/// [`FileError`] that names every field that is empty or missing, or the first invalid one.
+/// # Errors [`FileError`] that lists all empty or missing fields, or gives the first invalid one.
 pub fn read_laboratory(
     path: &Path,
     meta: impl Fn(&str) -> Option<String>,
@@ -62,7 +61,7 @@ pub fn read_laboratory(
     let mut open = Vec::new();
     take_empty(table.get_mut(), "", &mut open);
     let file: Result<Laboratory, FileError> = document.fill(table.clone());
-    // All that is open is named at once, unless another error comes first.
+    // All open fields are reported at once, unless another error comes first.
     if !matches!(&file, Err(error) if !error.message.starts_with("found no ")) {
         open.extend(missing(table.get_ref(), &of_item, &open));
         check_complete(document, open)?;
@@ -132,7 +131,7 @@ fn missing(table: &DeTable, of_item: &[(&str, Option<String>)], open: &[String])
     missing.filter(|path| !open.contains(path)).collect()
 }
 
-/// Names every open field, in the order of the tables in the file, and within a table in that of the draft.
+/// Lists every open field, in the order of the tables in the file and, within a table, in the order of the draft.
 fn check_complete(document: Document, mut open: Vec<String>) -> Result<(), FileError> {
     let place = |path: &String| {
         let (table, name) = path.split_once('.').unwrap_or(("", path));

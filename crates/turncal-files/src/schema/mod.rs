@@ -1,4 +1,4 @@
-//! Files written by users and for users: fields of TOML and JSON files as serde structs, with errors that name line,
+//! Files written by users and for users: fields of TOML and JSON files as serde structs, with errors that give line,
 //! column and field.
 
 mod calibration_file;

@@ -5,7 +5,7 @@ use std::fmt::Display;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-/// Tables that are written behind the name of a field.
+/// Tables written inline, after the name of a field.
 const INLINE: [&str; 3] = ["accel_from", "columns", "instance"];
 
 /// Remarks on fields and tables by their path, `table.field`.
@@ -18,38 +18,38 @@ pub struct Remarks {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Place {
-    /// On a line before the field or the table.
+    /// Remark on a line before the field or the table.
     Before,
-    /// Behind the value, if there is one.
+    /// Remark after the value, if there is one.
     Behind,
-    /// Behind the name of a missing field, or behind a value that becomes a comment.
+    /// Remark after the name of a missing field, or after a value that becomes a comment.
     Suggestion,
 }
 
 impl Remarks {
-    /// A line before a field or a table.
+    /// Adds a line before a field or a table.
     pub fn before(&mut self, path: &str, remark: impl Display) {
         self.add(path, Place::Before, remark);
     }
 
-    /// The reason for a value.
+    /// Adds the reason for a value.
     pub fn reason(&mut self, path: &str, why: impl Display) {
         self.add(path, Place::Behind, why);
     }
 
-    /// The purpose of an optional field; its value, if any, becomes a comment.
+    /// Adds the purpose of an optional field; its value, if any, becomes a comment.
     pub fn suggestion(&mut self, path: &str, why: impl Display) {
         self.add(path, Place::Suggestion, why);
     }
 
-    /// The purpose of a field that must be completed.
+    /// Adds the purpose of a field that must be completed.
     pub fn open(&mut self, path: &str, why: impl Display) {
         self.suggestion(path, format_args!("TODO: {why}"));
         let field = path.rsplit('.').next().unwrap_or_default();
         self.open.push((field.to_owned(), why.to_string()));
     }
 
-    /// The purpose of part of a field that must be completed, on a line before it.
+    /// Adds the purpose of part of a field that must be completed, on a line before the field.
     pub fn open_before(&mut self, path: &str, why: impl Display) {
         self.before(path, format_args!("TODO: {why}"));
         self.open.push((String::new(), why.to_string()));

@@ -1,4 +1,4 @@
-//! `run.toml` and the files that it names, read as one [`Run`].
+//! Reads `run.toml` and the files given in it as one [`Run`].
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -21,7 +21,7 @@ use turncal::units::{ARCSEC, DEGREE, MILLIGAL, PPM};
 use turncal_input::{Document, FileError, small_file, stated_gravity_sigma};
 use turncal_logs::DataFile;
 
-/// Reads `run.toml` and the files that it names, relative to itself.
+/// Reads `run.toml` and the files given in it, relative to itself.
 ///
 /// Everything is checked: known fields, finite and possible numbers, uniform time, overlapping files. Samples,
 /// nominal scales and priors are returned along right-front-up for any `body_axes`. Unstated site, noise, period
@@ -30,8 +30,8 @@ pub fn read_run(path: &Path) -> Result<Run, FileError> {
     run_of_text(path, &text_of(path)?, Some(path), &[])
 }
 
-/// Reads the text of a `run.toml` located (or assumed) next to this file and read from `source`; the files that it
-/// names may be in memory.
+/// Reads the text of a `run.toml` located (or assumed) next to this file and read from `source`; the files given in it
+/// may be in memory.
 pub fn run_of_text(
     path: &Path,
     text: &str,
@@ -86,7 +86,7 @@ pub fn run_of_text(
     Ok(run)
 }
 
-/// The file of the IMU that a `run.toml` names; it need not exist.
+/// The IMU file given in a `run.toml`; it need not exist.
 ///
 /// # Errors [`FileError`] if the `run.toml` is invalid.
 pub fn imu_file_of(path: &Path) -> Result<PathBuf, FileError> {
@@ -110,7 +110,7 @@ pub fn read_meta(path: &Path) -> Result<BTreeMap<String, String>, FileError> {
     Ok(meta)
 }
 
-/// Refuses a `run.toml` that [`crate::read_run`] would refuse for any content of the named files.
+/// Refuses a `run.toml` that [`crate::read_run`] would refuse for any content of the files given in it.
 pub fn check(document: Document) -> Result<(), FileError> {
     let run = run_file(document)?;
     let mut fields = Fields::new(document, &run, &[]);
@@ -193,7 +193,7 @@ impl InstrumentFields<'_> {
         let Some(period) = angle.filter(|&period| period > 0.0) else {
             return Err(FileError::of(
                 &self.log.source.file,
-                "rows without time stamps, with turns too poor to estimate the sample period",
+                "rows without time stamps, and turns that are not good enough to estimate the sample period",
                 "a time column or sample_period_s in run.toml",
                 "State sample_period_s (--rate).",
             ));
@@ -202,8 +202,8 @@ impl InstrumentFields<'_> {
         let sigma = self.known.prior.gyro.scale_sigma.norm() / 3.0;
         let percent = 100.0 * sigma;
         notes.push(format!(
-            "The log has no time column, and its rate is not stated. turncal estimated a sample period of {period:.4} s \
-             ± {percent:.1} % from the turns, which widens the σ of the gyro scale factors by the same amount. State \
+            "The log has no time column, and its rate is not stated. turncal estimated a sample period of {period:.4} \
+             s ± {percent:.1} % from the turns; this uncertainty is included in the σ of the gyro scale factors. State \
              sample_period_s (--rate)."
         ));
         Ok(imu.with_period(period, sigma))
@@ -233,8 +233,8 @@ impl InstrumentFields<'_> {
         };
         Some(format!(
             "The time stamps are {period} s apart, {ppm:.2} ppm {way} than sample_period_s. turncal used the time \
-             stamps, which changes the scale factor of the {triad} by the same amount, {judged} \
-             its prior σ of {sigma:.2} ppm.{advice}"
+             stamps; this changes the scale factor of the {triad} by the same amount, {judged} its prior σ of \
+             {sigma:.2} ppm.{advice}"
         ))
     }
 }
@@ -290,10 +290,9 @@ fn place_note(site: &Site, has_gravity: bool, has_height: bool) -> Option<String
         (true, false) => ("height", "height_m (--height)"),
         (true, true) => return None,
     };
-    let of_rate =
-        "estimated Earth rate as an unknown vector, which widens the σ of the gyro biases";
+    let of_rate = "estimated Earth rate as an unknown vector (larger σ of the gyro biases)";
     let of_gravity = format!(
-        "assumed a gravity of {:.4} ± {:.4} m/s², which widens the σ of the accelerometer scale factors",
+        "assumed a gravity of {:.4} ± {:.4} m/s² (larger σ of the accelerometer scale factors)",
         site.gravity, site.gravity_sigma
     );
     let costs = match (site.is_known, has_gravity) {

@@ -124,7 +124,7 @@ pub struct TriadFields<'a> {
 }
 
 impl ImuFile {
-    /// From the axes of the log to right, front, up.
+    /// Axis order from the axes of the log to right, front, up.
     pub fn axes(&self) -> AxisOrder {
         self.body_axes.map_or(AxisOrder::IDENTITY, BodyAxes::order)
     }
@@ -170,7 +170,7 @@ pub struct InstanceFile {
     pub number: Finite,
 }
 
-/// A number without decimals if it has none.
+/// Writes a whole number without decimals.
 fn whole<S: Serializer>(number: &Finite, serializer: S) -> Result<S::Ok, S::Error> {
     let whole = number.0 as i64;
     if whole as f64 == number.0 {
@@ -294,7 +294,7 @@ pub struct TurntableFile {
 }
 
 impl TurntableFile {
-    /// Errors of the axes with their keys and 1σ.
+    /// Errors of the table axes, with their keys and 1σ.
     pub fn axis_errors(&self) -> [(AxisError, &'static str, Option<Angle>); 3] {
         let nonorthogonality = self.nonorthogonality_sigma_arcsec;
         let (wobble, encoder) = (self.wobble_sigma_arcsec, self.encoder_sigma_arcsec);

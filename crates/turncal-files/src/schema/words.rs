@@ -16,7 +16,7 @@ pub enum BodyAxes {
 }
 
 impl BodyAxes {
-    /// From these axes to right, front, up.
+    /// Axis order from these axes to right, front, up.
     pub fn order(self) -> AxisOrder {
         match self {
             Self::Rfu => AxisOrder::IDENTITY,
@@ -26,7 +26,7 @@ impl BodyAxes {
     }
 }
 
-/// The moment of a sample that its time stamp marks.
+/// The moment within a sample that its time stamp marks.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema,
 )]
@@ -93,7 +93,7 @@ impl TimeUnitField {
 
     /// The unit.
     ///
-    /// # Errors The name, if it is none of [`TimeUnit::WORDS`].
+    /// # Errors The name, if it is not one of [`TimeUnit::WORDS`].
     pub fn unit(&self) -> Result<TimeUnit, &str> {
         let name = match self {
             Self::Tick(tick) => return Ok(TimeUnit::PerSecond(tick.0.recip())),

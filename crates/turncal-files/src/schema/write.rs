@@ -76,7 +76,7 @@ pub fn write_rows(
     rows: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> io::Result<()> {
     if name.extension().is_some_and(|extension| extension == "gz") {
-        // No time of writing in the header, so that the same run gives the same bytes.
+        // The header contains no time of writing, so that the same run gives the same bytes.
         let gz = GzBuilder::new()
             .mtime(0)
             .write(file, Compression::default());

@@ -4,7 +4,8 @@ use std::collections::VecDeque;
 
 use super::median;
 
-/// Rows after a late one that reveal it: no burst is longer, and an approximate period suffices over so few rows.
+/// Number of rows that reveal that an earlier one is late: no burst is longer, and an approximate period suffices over
+/// so few rows.
 pub const REACH: usize = 128;
 /// Fraction of the difference of a stamp by which the clock phase follows it, small enough to average jitter …
 const PHASE: f64 = 0.02;
@@ -72,7 +73,7 @@ impl Counter {
 
     /// Missing samples before the first of these times: the number that matches most rows with their times.
     ///
-    /// Rows off by more than a sample count only as such; for Laplacian jitter, the remaining distances give the
+    /// Rows that are off by more than a sample are only counted; for Laplacian jitter, the other distances give the
     /// likelihood.
     fn missing(&self, times: &[f64]) -> f64 {
         let rows = times.iter().take(WITNESSES).zip(1..);
@@ -93,7 +94,7 @@ impl Counter {
                 Some(*gain)
             });
             let gains: Vec<f64> = gains.collect();
-            // What only rows further on ask for is missing before those.
+            // If only later rows indicate a gap, it is before those rows, not here.
             let from_here_on = gains.iter().all(|&gain| gain > -ALIKE);
             match gains.last() {
                 Some(&gain) if from_here_on && gain > price + ALIKE => missing,
@@ -103,7 +104,7 @@ impl Counter {
     }
 }
 
-/// Offset from the first stamp to its due time, from the circular mean of the first phases, which gaps do not affect.
+/// Offset from the first stamp to its due time, from the circular mean of the first phases (not affected by gaps).
 fn phase(times: &[f64], period: f64) -> f64 {
     let turn = std::f64::consts::TAU / period;
     let (sin, cos) = times
@@ -116,11 +117,12 @@ fn phase(times: &[f64], period: f64) -> f64 {
 
 /// Row times, with late rows at the latest time allowed by the following rows.
 ///
-/// A row was sampled before the following ones, by one period each. A stamp that contradicts this by more than a
-/// period, beyond jitter and rounding, is due to a busy logger or a burst.
+/// Each row was sampled one period before the next. A stamp that contradicts this by more than a period, beyond jitter
+/// and rounding, is due to a busy logger or a burst.
 pub fn punctual(stamps: &[(f64, u64)], period: f64) -> Vec<f64> {
     let mut times: Vec<f64> = stamps.iter().map(|&(time, _)| time).collect();
-    // Against a clock without gaps; rows behind, each earlier than all between it and this one.
+    // Time relative to a clock without gaps. `behind`: later rows that are each earlier than all rows between them and
+    // this one.
     let against = |row: usize| stamps[row].0 - stamps[0].0 - row as f64 * period;
     let mut behind: VecDeque<usize> = VecDeque::new();
     for row in (0..stamps.len()).rev() {
@@ -144,16 +146,16 @@ pub fn punctual(stamps: &[(f64, u64)], period: f64) -> Vec<f64> {
     times
 }
 
-/// Number of rows over which steps are compared: more average jitter, fewer are more often without a gap. Doubled as
-/// often as needed for bursts.
+/// Number of rows over which steps are compared: more rows average jitter, fewer rows are more often without a gap. It
+/// is doubled as often as bursts require.
 const SPAN: usize = 8;
-/// Spans without a gap differ from their median by less, in samples.
+/// Spans without a gap differ from their median by less than this, in samples.
 const NO_GAP: f64 = 0.8;
 
 /// Mean step without missing rows, free of the rounding of single printed steps.
 pub fn mean_step(stamps: &[(f64, u64)]) -> f64 {
     let rows = stamps.len() - 1;
-    // Rows that are missing make this longer, never shorter.
+    // Missing rows make this step longer, never shorter.
     let longest = (stamps[rows].0 - stamps[0].0) / rows as f64;
     let mut span = SPAN;
     while span < rows {

@@ -12,9 +12,9 @@ use turncal_input::{FileError, Place};
 pub struct Uniform {
     /// Due time of the first sample, s.
     pub first: f64,
-    /// s
+    /// Sample period, s.
     pub period: f64,
-    /// Sample number of each row, from 0. Empty if they were delivered one by one.
+    /// Sample number of each row, from 0. Empty if the numbers were delivered one by one.
     pub numbers: Vec<usize>,
     /// Stamps relative to due times, s; for drifting samples, relative to their own times.
     pub jitter_rms: f64,
@@ -91,7 +91,7 @@ pub struct Line {
     /// Sums over the stamps, with late rows at the time allowed by the following rows.
     placed: Sums,
     knots: Knots,
-    /// Stamps that may be farthest below and above a line.
+    /// Candidates for the stamps farthest below and above a line.
     hulls: [Vec<[f64; 2]>; 2],
 }
 
@@ -168,7 +168,7 @@ impl Line {
     }
 
     /// The most likely count: rows missing according to the stamps, or none. Each gap must raise the likelihood by the
-    /// cost of naming its place among all rows (minimum description length). `Err` is the row after too long a gap.
+    /// cost of encoding its place among all rows (minimum description length). `Err` is the row after too long a gap.
     fn likeliest(
         stamps: &[(f64, u64)],
         about: f64,
@@ -176,7 +176,7 @@ impl Line {
     ) -> Result<(Self, Vec<usize>), usize> {
         let counted = |counting| -> Result<(Self, Vec<usize>), usize> {
             let (line, numbers) = Self::through(stamps, about, fixed, counting)?;
-            // A period that jitter and gaps falsified may have lost count once or twice.
+            // With a period distorted by jitter and gaps, the count may have been off once or twice.
             if fixed {
                 Ok((line, numbers))
             } else {
@@ -324,7 +324,7 @@ impl Line {
     fn fit(&self, period: f64) -> Result<Uniform, FileError> {
         let slope = period - self.about;
         let mut level = (self.placed.x - slope * self.placed.n) / self.placed.count;
-        // Where nothing is rounded the fit must not be.
+        // If the stamps are not rounded, the fit must not round either.
         if level.abs() < EXACT {
             level = 0.0;
         }

@@ -40,7 +40,7 @@ impl Clock<'_> {
 /// Position of a row by its stamp: number of kept rows before it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stamp {
-    /// The row is taken, after this number of kept rows.
+    /// The row is kept, after this number of kept rows.
     New(usize),
     /// The stamp equals that of the previous row.
     Again(usize),
@@ -80,15 +80,15 @@ pub struct Stamps {
     set: Vec<String>,
     /// Number of rows before the last clock setting.
     set_before: Option<usize>,
-    /// Reordered rows, and the line of the first.
+    /// Number of reordered rows, and the line of the first.
     out_of_order: (usize, u64),
-    /// Rows since the latest one that belong before it.
+    /// Number of rows since the latest one that belong before it.
     behind: usize,
     /// Whether rows with equal times may have different values.
     bursts: bool,
-    /// Consecutive rows with equal times.
+    /// Number of consecutive rows with equal times.
     standing: usize,
-    /// Rows with the time but not the values of another, and the line of the first.
+    /// Number of rows with the same time as another row but other values, and the line of the first.
     at_once: (usize, u64),
     /// Time in s and line of each row kept.
     pub of_rows: Vec<(f64, u64)>,
@@ -236,8 +236,8 @@ impl Stamps {
         self.of_rows.push((time + self.ahead, line));
     }
 
-    /// Inserts a late row at its position among the last rows: where a row is missing, or at the time of another. After
-    /// a clock was set back, these positions are occupied.
+    /// Inserts a late row at its position among the last rows: where a row is missing, or at the time of another row.
+    /// After a clock was set back, these positions are occupied.
     fn late(&mut self, time: f64, line: u64) -> Option<Stamp> {
         let last = self.of_rows.len().saturating_sub(REACH);
         let place = last + self.of_rows[last..].partition_point(|(other, _)| *other <= time);
@@ -326,7 +326,7 @@ impl Stamps {
 
     /// Treats the following rows as a separate part, slightly later.
     fn is_set(&mut self, csv: &LogRows, before: f64, step: f64) -> Result<(), FileError> {
-        // Where rows come behind later ones, or it happens again and again, a time that steps back is of no clock.
+        // If rows are out of order, or if the time steps back again and again, it is not the time of a clock.
         let row = self.let_go + self.of_rows.len();
         let again = self.set_before.is_some_and(|before| row - before < REACH);
         if self.breaks < Breaks::Settings || self.behind > 0 || again {
@@ -371,7 +371,7 @@ impl Stamps {
         let (Some(time), Some(before)) = (time.transpose()?, self.time) else {
             return Ok(false);
         };
-        // Those before it that a set clock put back may have had the same values.
+        // Earlier rows, before the clock was set back, may have had the same values.
         self.behind = 0;
         self.is_set(csv, before, time - before)?;
         self.go_on(time, csv.line());
@@ -403,8 +403,8 @@ impl Stamps {
         let (same, line) = self.at_once;
         notes.extend((same > 0).then(|| {
             format!(
-                "{file}: {} with the time of the row before but other values, the first in line {line}. Each counts \
-                 as a sample.",
+                "{file}: {} with the same time as the previous row but other values, the first in line {line}. Each \
+                 counts as a sample.",
                 counted(same, "row")
             )
         }));
@@ -442,7 +442,7 @@ fn count((count, first): &mut (usize, u64), line: u64) {
     }
 }
 
-/// More rows with the same time than a burst can have, a minute or more: the time has stopped.
+/// More rows than a burst can have with one time (a minute or more): the time has stopped.
 const MOST_AT_ONCE: usize = 1 << 16;
 /// Assumed gap if the true one is unknown, and the length of a shortened pause, s; longer than any interpolation.
 const BREAK: f64 = 1.0;

@@ -3,7 +3,7 @@
 /// Converts the texts of a column to times.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ClockText {
-    /// Digits of fractions written without leading zeros.
+    /// Number of digits of fractions written without leading zeros.
     unpadded: Option<usize>,
 }
 
@@ -110,7 +110,7 @@ impl ClockText {
             times.windows(2).filter(|pair| pair[1] < pair[0]).count()
         };
         let (as_written, as_counted) = (steps_back(Self { unpadded: None }), steps_back(counted));
-        // Values of a sensor go back as often as forward.
+        // Values of a sensor decrease as often as they increase.
         let goes_on = 4 * as_written < parts.len();
         if goes_on && as_written > 4 * as_counted {
             Some(counted)

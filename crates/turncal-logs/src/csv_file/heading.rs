@@ -80,7 +80,7 @@ impl Look {
         }
     }
 
-    /// The fields if their number matches, with any delimiter; an empty one after the last is ignored.
+    /// The fields if their number matches, with any delimiter; an empty field at the end is ignored.
     fn fields(&self, delimiter: Delimiter, count: usize) -> Option<Vec<String>> {
         let fits = |mut fields: Vec<String>| {
             if fields.len() == count + 1 {
@@ -88,7 +88,7 @@ impl Look {
             }
             (fields.len() == count).then_some(fields)
         };
-        // The words of a sentence are no fields.
+        // The words of a sentence are not fields.
         let is_sentence = self.delimiter == Delimiter::Blanks;
         let own = || {
             self.fields
@@ -104,7 +104,7 @@ impl Look {
             .or_else(own)
     }
 
-    /// The same number of words, for names or units.
+    /// A line with the same number of words, for names or units.
     fn words(&self, delimiter: Delimiter, count: usize) -> Option<Vec<String>> {
         let fields = self.fields(delimiter, count)?;
         let filled = fields.iter().filter(|field| !field.is_empty()).count();
@@ -133,10 +133,11 @@ struct Shape {
 }
 
 impl Shape {
-    /// From the last rows, because names may be among the first; a last column that is always empty must have a name.
+    /// The shape is taken from the last rows, because names may be among the first; a last column that is always empty
+    /// must have a name.
     fn of(rows: &[&Look], all: &[Look]) -> Option<Self> {
         let rows = &rows[rows.len() - ROWS.min(rows.len().div_ceil(2))..];
-        // A separator is what rows share, and what parts numbers: a note may contain others.
+        // The separator is common to the rows and separates numbers; a note may contain other separators.
         let mut shapes = BTreeMap::<_, (usize, usize)>::new();
         let own = rows.iter().map(|row| row.delimiter);
         let delimiters = own.chain([b',', b';', b'\t'].map(Delimiter::Byte));
@@ -229,7 +230,8 @@ impl Looks {
         Self(looks.collect())
     }
 
-    /// Heading of all rows, of those with a tag, or of the samples of a labelled stream. None for a file without rows.
+    /// Heading of all rows, of the rows with a tag, or of the samples of a labelled stream; `None` for a file without
+    /// rows.
     pub fn heading(
         &self,
         tag: Option<(&Tags, &str)>,
@@ -286,7 +288,7 @@ impl Looks {
         }))
     }
 
-    /// The names that words beside values give them, if there are any.
+    /// The names of values according to the words next to them, if there are any.
     fn of_labels(&self, labelled: Option<&Stream>, first: usize) -> Option<Named> {
         let stream = labelled.filter(|of| of.names.iter().any(|name| !name.is_empty()))?;
         let names = stream.names.iter().zip(1..);
@@ -325,7 +327,7 @@ impl Looks {
             });
             words(*k).is_some() && is_other != Some(true)
         };
-        // A line right above the rows is nearer to them than any other, though rows lack the field of a remark.
+        // The line immediately above the rows is the most likely heading, even if rows lack the field of a remark.
         let above = first.checked_sub(1).and_then(|above| looks.get(above));
         let columns = shape.numbers.len();
         let is_longer = above.is_some_and(|look| {
@@ -353,8 +355,8 @@ impl Looks {
         })
     }
 
-    /// The same if no line has as many words as rows have columns: numbers, unless the lines above are mismatched names
-    /// or a mismatched row rather than a preamble.
+    /// The column names if no line has as many words as rows have columns: numbers, unless the lines above are
+    /// mismatched names or a mismatched row rather than a preamble.
     fn unnamed(&self, shape: &Shape, first: usize, is_tagged: bool) -> Result<Named, Stop> {
         let Self(looks) = self;
         let columns = shape.numbers.len();
@@ -445,7 +447,7 @@ impl Looks {
     }
 }
 
-/// How the texts of each column are read as times.
+/// Conversion of the text of each column to times.
 fn clocks(rows: &[Vec<String>], columns: usize) -> Vec<Option<ClockText>> {
     let clock = |column: usize| {
         let texts = rows.iter().map(|row| row[column].as_str());
@@ -455,7 +457,7 @@ fn clocks(rows: &[Vec<String>], columns: usize) -> Vec<Option<ClockText>> {
     (0..columns).map(clock).collect()
 }
 
-/// Remark on an orientation that a preamble states.
+/// Remark on an orientation stated in a preamble.
 fn orientation(says: &[&str]) -> Option<String> {
     let letters = value(says, "orientation")?;
     Some(format!(
@@ -481,7 +483,7 @@ fn value<'a>(says: &[&'a str], key: &str) -> Option<&'a str> {
     })
 }
 
-/// Units of a line of units, of clocks and of the scales that a preamble states.
+/// Units from a line of units, from clocks and from the scales stated in a preamble.
 fn units_with(
     units: Option<Vec<String>>,
     names: &[String],
@@ -529,7 +531,7 @@ fn names_and_units(levels: &[Vec<String>], is_comment: bool) -> (Vec<String>, Op
     (levels[0].clone(), levels.get(1).cloned())
 }
 
-/// Whether each names one column; units of two columns are often equal.
+/// Whether each word names one column; units of two columns are often equal.
 fn are_distinct(names: &[String]) -> bool {
     let mut sorted: Vec<&str> = names.iter().map(String::as_str).collect();
     sorted.retain(|name| !name.is_empty());
@@ -537,7 +539,7 @@ fn are_distinct(names: &[String]) -> bool {
     sorted.windows(2).all(|pair| pair[0] != pair[1])
 }
 
-/// The rate in Hz that a line such as `Update Rate: 100.0Hz` or `sampling rate,100` states.
+/// The rate in Hz from a line such as `Update Rate: 100.0Hz` or `sampling rate,100`.
 fn rate(remark: &str) -> Option<f64> {
     let remark = remark.to_lowercase();
     let (before, rest) = remark.split_once("rate").or(remark.split_once("freq"))?;
@@ -557,7 +559,7 @@ fn rate(remark: &str) -> Option<f64> {
     rate.filter(|_| in_hertz)
 }
 
-/// A text in UTF-8, or else in Latin 1, whose letters are those of Unicode.
+/// A text in UTF-8, otherwise in Latin 1 (the first 256 characters of Unicode).
 fn text_of(bytes: &[u8]) -> String {
     match std::str::from_utf8(bytes) {
         Ok(text) => text.to_owned(),
@@ -567,14 +569,14 @@ fn text_of(bytes: &[u8]) -> String {
 
 /// Whether a field is a number, with a point or a comma.
 fn is_number(field: &str) -> bool {
-    // A comma behind the last digit parts fields.
+    // A comma after the last digit separates fields.
     !field.ends_with(',') && field.replacen(',', ".", 1).parse::<f64>().is_ok()
 }
 
 /// Field separator of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Delimiter {
-    /// One byte.
+    /// A single byte.
     Byte(u8),
     /// Any number of spaces and tabs.
     Blanks,
@@ -591,14 +593,14 @@ impl Delimiter {
                 Self::Blanks
             };
         }
-        // A comma with a tab behind it is a comma.
+        // A comma followed by a tab counts as a comma.
         let parts = |byte: &u8| match Self::Byte(*byte).fields(row) {
             _ if !row.as_bytes().contains(byte) => false,
             Ok(fields) => {
                 fields.iter().filter(|field| !field.is_empty()).count() > 1
                     && !(*byte == b'\t' && fields.iter().any(|f| f.ends_with(',')))
             }
-            // Whoever reads the row by it says what is wrong.
+            // The code that reads the row with this separator reports the fault.
             Err(_) => true,
         };
         let byte = [b';', b'\t', b','].into_iter().find(parts);

@@ -1,4 +1,4 @@
-//! Kind of the rows of a text, which distinguishes rows from other lines as they arrive.
+//! Kind of the rows of a text, to distinguish rows from other lines as they arrive.
 
 use super::heading::Delimiter;
 use super::lines::{comment, has_content};
@@ -30,7 +30,7 @@ impl RowKind {
         })
     }
 
-    /// Checks that a line is a row of this kind; otherwise says what was found and expected.
+    /// Checks that a line is a row of this kind; the error gives what was found and expected.
     pub fn check(&self, line: &[u8]) -> Result<(), String> {
         let row = split(line, self.delimiter);
         let (found, expected) = (row.len(), self.are_numbers.len());

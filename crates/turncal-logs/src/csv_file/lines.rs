@@ -151,7 +151,7 @@ impl Lines {
                     }
                 }
             }
-            // Most rows begin with a digit, and need no look.
+            // Most rows begin with a digit and need no further test.
             let is_row = self.line.text.first().is_some_and(u8::is_ascii_digit);
             if is_row || any || self.line.comment().is_none() {
                 self.row = self.line.number;
@@ -200,7 +200,7 @@ impl Lines {
     }
 }
 
-/// Converts UTF-16 to UTF-8; surrogate pairs, which occur in no number or name here, are lost.
+/// Converts UTF-16 to UTF-8; surrogate pairs are lost (they do not occur in numbers or names here).
 struct Utf16 {
     source: Box<dyn BufRead>,
     unit: fn([u8; 2]) -> u16,

@@ -8,7 +8,7 @@ pub const LONGEST_FIELD: usize = 1 << 16;
 /// Reason why a line is not a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Malformed {
-    /// A field starts with a quote that is not closed in its line.
+    /// A field starts with a quote that is not closed on the same line.
     Quote,
     /// More columns than [`MOST_COLUMNS`].
     Columns,
@@ -19,14 +19,14 @@ pub enum Malformed {
 /// The fields of a line, possibly quoted; no field extends beyond its line.
 pub struct Row {
     delimiter: u8,
-    /// The fields without their quotes, with a delimiter behind each.
+    /// The fields without their quotes, each followed by a delimiter.
     text: Vec<u8>,
     /// End of each field in the text.
     ends: Vec<usize>,
 }
 
 impl Row {
-    /// No fields yet, with this separator.
+    /// A row without fields so far, with this separator.
     pub fn new(delimiter: u8) -> Self {
         Self {
             delimiter,

@@ -1,7 +1,7 @@
 //! Lines by their shape: the words and signs of a line, with every number and time replaced by a mark.
 //!
-//! Shapes that repeat are streams of samples. What stands before a mark names its value; a line of a rare shape is a
-//! remark, a damaged row or the text of a starting device.
+//! Shapes that repeat are streams of samples. The text before a mark is the name of its value; a line with a rare shape
+//! is a remark, a damaged row or the text of a starting device.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -12,7 +12,7 @@ use super::lines::{Line, comment};
 const MARK: u8 = 1;
 /// Stands for a word of digits and letters, such as a status in hexadecimal digits.
 const WORD: u8 = 2;
-/// Fewest lines of a stream, and the part of all lines that they are at least: fewer lines are rare.
+/// Minimum number of lines of a stream, and their minimum fraction of all lines; fewer lines count as rare.
 const FEWEST: usize = 5;
 pub const RARE: usize = 50;
 /// Separates the values of a sample once words are removed.
@@ -20,7 +20,7 @@ pub const SEPARATOR: u8 = b'\t';
 /// Longest name of a value.
 const LONGEST_NAME: usize = 32;
 
-/// A line, with the places of its numbers, times and words of digits and letters.
+/// A line, with the positions of its numbers, times and words of digits and letters.
 struct Marked<'a> {
     text: &'a [u8],
     marks: Vec<Range<usize>>,
@@ -89,7 +89,7 @@ fn digits(text: &[u8]) -> usize {
     text.iter().take_while(|byte| byte.is_ascii_digit()).count()
 }
 
-/// Length of a number at the begin of a text. Letters behind it end its field, or it is none.
+/// Length of a number at the beginning of a text. Letters after it end its field; otherwise, it is not a number.
 fn number(text: &[u8], comma: bool) -> Option<usize> {
     let mut at = usize::from(matches!(text.first(), Some(b'+' | b'-')));
     if let [a, b, c, rest @ ..] = &text[at..]
@@ -127,7 +127,7 @@ fn number(text: &[u8], comma: bool) -> Option<usize> {
     ends.then_some(at)
 }
 
-/// Length of a date, a time of day or both at the begin of a text.
+/// Length of a date, a time of day or both at the beginning of a text.
 fn time(text: &[u8]) -> Option<usize> {
     let mut at = date(text);
     if at > 0 && matches!(text.get(at), Some(b' ' | b'T' | b'_')) && clock(&text[at + 1..]) > 0 {
@@ -200,7 +200,7 @@ fn clock(text: &[u8]) -> usize {
     }
 }
 
-/// Length of a word that mixes digits and letters, as hexadecimal numbers do.
+/// Length of a word that mixes digits and letters, like a hexadecimal number.
 fn mixed(text: &[u8], is_in_word: bool) -> Option<(usize, u8)> {
     let length = text
         .iter()
@@ -212,15 +212,15 @@ fn mixed(text: &[u8], is_in_word: bool) -> Option<(usize, u8)> {
     (!is_in_word && is_mixed).then_some((length, WORD))
 }
 
-/// Lines of equal shapes, one after the other, that make up one sample.
+/// Successive lines of these shapes that form one sample.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Stream {
-    /// A word that names it among the streams of its file.
+    /// A word that distinguishes the stream from the others in its file.
     pub name: String,
     shapes: Vec<Vec<u8>>,
-    /// Names of its values, empty where no word stands before them.
+    /// Names of its values; empty if there is no word before a value.
     pub names: Vec<String>,
-    /// Units of its values, empty where none is stated.
+    /// Units of its values; empty if not stated.
     pub units: Vec<String>,
 }
 
@@ -232,7 +232,7 @@ pub struct Labelled {
 }
 
 impl Labelled {
-    /// The streams in these lines, if words stand beside the numbers in most rows.
+    /// The streams in these lines, if most rows have words next to their numbers.
     pub fn of<'a>(lines: impl Iterator<Item = &'a Line> + Clone) -> Option<Self> {
         let count = lines.clone().count();
         let comma = 2 * lines
@@ -243,7 +243,7 @@ impl Labelled {
         let marked = lines.map(|line| Marked::of(&line.text, comma));
         let mut kinds: Vec<Kind> = Vec::new();
         let mut places = HashMap::new();
-        // Places of the kinds of all lines with numbers.
+        // Indices of the kinds of all lines with numbers.
         let mut order = Vec::new();
         for line in marked.filter(|line| !line.marks.is_empty()) {
             let place = *places.entry(line.shape.clone()).or_insert(kinds.len());
@@ -263,7 +263,7 @@ impl Labelled {
             return None;
         }
         order.retain(is_stream);
-        // Lines with a time each are samples of their own.
+        // Lines that each have a time are separate samples.
         let are_parts = streams.filter(|kind| kind.has_time()).count() < 2;
         let kind = |place: &usize| &kinds[*place];
         let streams = cycle(&order).filter(|_| are_parts);
@@ -331,7 +331,7 @@ impl Kind {
         self.count += 1;
         let last = self.last.iter_mut().zip(&mut self.increases);
         for ((last, increases), value) in last.zip(line.values()) {
-            // A time of day is one whatever its value.
+            // A time of day counts as a time for any value.
             if value.contains(&b':') {
                 continue;
             }
@@ -349,27 +349,27 @@ impl Kind {
     }
 }
 
-/// A sample that is read line by line.
+/// A sample read line by line.
 #[derive(Debug, Default)]
 pub struct Sample {
     values: Vec<u8>,
     lines: usize,
 }
 
-/// What a line adds to a sample.
+/// Contribution of a line to a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Added {
     /// Its last values.
     Complete,
     /// Values before others.
     Part,
-    /// None: it has another shape.
+    /// No values, because the line has another shape.
     Nothing,
 }
 
 impl Sample {
-    /// Adds the values of a line, which the values of the sample replace once it is complete. A sample without some of
-    /// its lines is left out.
+    /// Adds the values of a line; once the sample is complete, they are replaced by the values of the sample. A sample
+    /// with missing lines is left out.
     pub fn add(&mut self, labelled: &Labelled, stream: &Stream, line: &mut Vec<u8>) -> Added {
         let marked = Marked::of(line, labelled.comma);
         let is = |part: usize| stream.shapes.get(part) == Some(&marked.shape);
@@ -410,12 +410,12 @@ fn has_decimal_comma(line: &[u8]) -> bool {
     line.iter().any(|byte| matches!(byte, b';' | b'\t')) && fields.into_iter().any(is_decimal)
 }
 
-/// Whether words or signs stand beside numbers in a field, or words between the numbers of a row, or the row begins as
-/// a comment or a sentence of a receiver.
+/// Whether a field has words or signs next to its number, a row has words between its numbers, or the row begins like a
+/// comment or a sentence of a receiver.
 fn is_labelled(shape: &[u8]) -> bool {
     let is_mark = |byte: &u8| matches!(*byte, MARK | WORD);
     let has_mark = |field: &[u8]| field.iter().any(is_mark);
-    // What parts most numbers.
+    // The separator of most numbers.
     let parted = |by: &u8| {
         let fields = shape.split(|byte| byte == by);
         fields.filter(|field| has_mark(field)).count()
@@ -433,7 +433,8 @@ fn is_labelled(shape: &[u8]) -> bool {
     };
     let by = separator.unwrap_or(b' ');
     let fields: Vec<&[u8]> = shape.split(|byte| *byte == by).collect();
-    // Between blanks, a word is that of the number behind it if it says so, or if there is another before it.
+    // Between blanks, a word belongs to the number after it if it is marked as a label, or if there is another word
+    // before it.
     let first = fields.iter().position(|field| has_mark(field));
     let mut pairs = fields.windows(2).enumerate();
     let names_next = pairs.any(|(k, pair)| {
@@ -448,7 +449,7 @@ fn is_labelled(shape: &[u8]) -> bool {
         || separator.is_none() && names_next
 }
 
-/// The kinds of lines that follow each other in turn, if all do.
+/// The kinds of lines, if all of them follow each other in turn.
 fn cycle(order: &[usize]) -> Option<Vec<usize>> {
     let mut period: Vec<usize> = Vec::new();
     for place in order {
@@ -474,13 +475,13 @@ fn cycle(order: &[usize]) -> Option<Vec<usize>> {
     })
 }
 
-/// What stands beside a value.
+/// Label of a value.
 #[derive(Default)]
 struct Label {
     /// Words before it, without signs at their ends.
     words: String,
     unit: String,
-    /// Axis that the words end with.
+    /// Axis at the end of the words.
     axis: Option<char>,
     /// Whether the value only increases, as a time does.
     increases: bool,
@@ -526,7 +527,7 @@ fn labels(shape: &[u8]) -> Vec<Label> {
         let glued = piece
             .find(|c: char| !c.is_alphabetic() && c != '°')
             .unwrap_or(piece.len());
-        // Words up to a separator belong to the value before it, as do letters without a blank.
+        // Words up to a separator belong to the preceding value; so do letters without a blank.
         let end = match piece.find(is_separator) {
             Some(end) => end,
             None if is_last => piece.len(),
@@ -577,7 +578,7 @@ impl Label {
     }
 }
 
-/// The axis that a word is.
+/// The axis denoted by a word.
 fn axis(word: &str) -> Option<char> {
     let mut letters = word.chars();
     letters
@@ -631,14 +632,14 @@ fn named(labels: &[Label]) -> Vec<(String, String)> {
 }
 
 impl Label {
-    /// The value by this name, with the unit of another label if it has none.
+    /// The value with this name; if it has no unit, with the unit of another label.
     fn called(&self, name: String, other: &Self) -> (String, String) {
         let own = Some(&self.unit).filter(|unit| !unit.is_empty());
         (name, own.unwrap_or(&other.unit).clone())
     }
 }
 
-/// Names of which none is used twice.
+/// Names made unique.
 fn distinct(mut named: Vec<(String, String)>) -> Vec<(String, String)> {
     let all = named.clone();
     for (k, (name, _)) in named.iter_mut().enumerate() {

@@ -1,6 +1,6 @@
 //! Arrays of a file, combined into streams and read row by row.
 //!
-//! Arrays of the same number of rows are one stream; an array of several columns gives `name[0]`, `name[1]`, …
+//! Arrays with the same number of rows form one stream; an array of several columns gives `name[0]`, `name[1]`, …
 
 use std::io::{self, Read};
 use std::rc::Rc;
@@ -39,7 +39,7 @@ pub struct Field {
 }
 
 impl Array {
-    /// Number of items, if countable.
+    /// Number of items; `None` if it is too large.
     fn items(&self) -> Option<usize> {
         let mut sizes = self.shape.iter();
         sizes.try_fold(1usize, |all, &size| all.checked_mul(size))
@@ -107,7 +107,7 @@ impl Array {
             offset: self.offset,
         };
         if step == columns {
-            // A row's numbers lie side by side.
+            // The numbers of a row are adjacent.
             let of_field = |field| (0..columns).map(move |index| (field, index));
             let cells = self.fields.iter().flat_map(of_field);
             let cells = cells.map(|(field, index)| cell(field, index, first(index)));
@@ -120,7 +120,7 @@ impl Array {
         each.collect()
     }
 
-    /// Items from one to the next along each dimension.
+    /// Distance, in items, between neighbours along each dimension.
     fn strides(&self) -> Vec<usize> {
         let mut strides = vec![1; self.shape.len()];
         let mut stride = 1;
@@ -204,7 +204,7 @@ impl Cursor {
     }
 }
 
-/// Columns of a file; those of the same length are one stream, row by row.
+/// Columns of a file; columns of the same length form one stream, row by row.
 pub struct Arrays {
     streams: Vec<Stream>,
     groups: Vec<Vec<Cursor>>,

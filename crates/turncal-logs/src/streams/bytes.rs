@@ -23,8 +23,8 @@ impl Broken {
     }
 }
 
-/// Maximum number of bytes unpacked at once from a log of this length (a chunk, a row of an array). Real chunks have a
-/// few megabytes; larger claims are damage or decompression bombs.
+/// Maximum number of bytes unpacked at once from a log of this length (a chunk, a row of an array). Real chunks are a
+/// few megabytes long; larger stated sizes indicate damage or a decompression bomb.
 pub fn most_at_once(length: u64) -> u64 {
     length.max(1 << 27)
 }
@@ -67,7 +67,7 @@ impl Input {
         self.length.saturating_sub(self.offset)
     }
 
-    /// Reads `count` bytes, all of which must exist; `what` names them in errors.
+    /// Reads `count` bytes, all of which must exist; errors call them `what`.
     pub fn take(&mut self, count: u64, into: &mut Vec<u8>, what: &str) -> Result<(), Broken> {
         into.clear();
         if count > self.left() {

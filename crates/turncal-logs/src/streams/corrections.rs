@@ -55,7 +55,7 @@ pub struct Undo {
     /// Program that applied the correction.
     pub program: &'static str,
     pub corrected: PerSensor<Option<Corrected>>,
-    /// Corrections so far, in words.
+    /// Descriptions of the corrections so far.
     done: PerSensor<Vec<String>>,
     /// Applied correction, while parameters and device are unchanged.
     found: PerSensor<Option<Known>>,

@@ -44,7 +44,7 @@ struct DataFlash {
     /// Number of parameter changes.
     changes: u64,
     streams: Vec<Stream>,
-    /// By type and instance.
+    /// Streams by type and instance.
     of_streams: BTreeMap<(u8, u8), usize>,
     undo: Vec<(Undo, u8)>,
     message: Vec<u8>,
@@ -262,7 +262,7 @@ impl DataFlash {
             return stream;
         }
         let stem = format.name.trim_end_matches(|c: char| c.is_ascii_digit());
-        // Before instances were a column, the second had another name.
+        // In older logs without an instance column, the second instance has another name.
         let number = format.name[stem.len()..]
             .parse()
             .unwrap_or(1u8)
@@ -277,7 +277,7 @@ impl DataFlash {
             columns: format.columns.clone(),
             remarks: Vec::new(),
             is_inertial: format.is_inertial(),
-            // A log with its parameters is an autopilot's, along front, right, down.
+            // A log with such parameters is from an autopilot, with axes front, right, down.
             axes: (!self.parameters.is_empty()).then_some("frd"),
         });
         self.of_streams.insert(key, stream);
@@ -309,7 +309,7 @@ fn applied(parameters: &BTreeMap<String, f64>, sensor: Sensor, instance: u8) -> 
     Some(Applied {
         name: sensor.pick(format!("{stem}OFFS"), format!("{stem}OFFS and {stem}SCAL")),
         offset,
-        // Zero stands for a scale that was never calibrated.
+        // Zero means that the scale was never calibrated.
         scale: scale
             .filter(|scale| scale.iter().all(|&s| s != 0.0))
             .unwrap_or([1.0; 3]),

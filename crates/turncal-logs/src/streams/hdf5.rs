@@ -18,7 +18,7 @@ use super::bytes::{Broken, Input, Kind, most_at_once};
 /// Limits of group depth and number, because a group may contain itself.
 const DEEPEST: usize = 8;
 const MOST_GROUPS: usize = 1024;
-/// Numbers of an array within an item.
+/// Maximum number of array elements within an item.
 const MOST_NUMBERS: usize = 64;
 /// Bytes read at once, if rows and chunks are shorter.
 const AT_ONCE: u64 = 1 << 16;
@@ -35,7 +35,7 @@ pub fn open(input: Input) -> Result<Box<dyn Log>, Broken> {
         let expected = format!("an HDF5 file of {end} bytes");
         return Err(Broken::new(length, "the end of the file", expected));
     }
-    // Fields of MATLAB's structures are called as in a MAT file of version 5.
+    // Fields of MATLAB structures have the same names as in a MAT file of version 5.
     let is_mat = file.superblock().base_address.get() > 0;
     let mut walk = Walk {
         between: if is_mat { "." } else { "/" },
@@ -49,7 +49,7 @@ pub fn open(input: Input) -> Result<Box<dyn Log>, Broken> {
 
 fn broken(error: Error) -> Broken {
     let found = match error {
-        // The crate's own words advise its callers.
+        // The messages of the crate are addressed to its callers.
         Error::FileMarkedInUse { .. } => "a file that was not closed by its writer".to_owned(),
         Error::Format(FormatError::OffsetOverflow {
             offset: u64::MAX, ..
@@ -239,7 +239,7 @@ impl Stored {
         Ok(Box::new(rows))
     }
 
-    /// One long row, or short ones in whole chunks, because reading a part of a chunk unpacks all of it.
+    /// One long row, or short rows in whole chunks, because reading part of a chunk unpacks the whole chunk.
     fn rows_at_once(&self) -> io::Result<u64> {
         let row = self.row.max(1);
         if row >= AT_ONCE {

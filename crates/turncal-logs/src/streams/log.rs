@@ -26,7 +26,7 @@ impl Column {
 pub struct Stream {
     /// Name in `run.toml`.
     pub name: String,
-    /// Columns; empty until the first sample if only this sample defines them.
+    /// Columns; empty until the first sample if only that sample defines them.
     pub columns: Vec<Column>,
     /// Remarks on its values, one sentence each.
     pub remarks: Vec<String>,

@@ -14,11 +14,11 @@ const HEADER: u64 = 128;
 const MATRIX: u64 = 14;
 const COMPRESSED: u64 = 15;
 const STRUCT: u8 = 2;
-/// Structures within structures.
+/// Maximum nesting depth of structures.
 const DEEPEST: usize = 8;
-/// Types of elements, from numbers to texts in UTF-32.
+/// Valid types of elements, from numbers to text in UTF-32.
 const TYPES: std::ops::RangeInclusive<u64> = 1..=18;
-/// Deflated data are at most this many times shorter.
+/// Maximum compression ratio of deflate.
 const DEFLATE: u64 = 1040;
 /// Arrays of at most this many times their compressed size are kept in memory; longer ones are unpacked for each column.
 const KEPT: u64 = 16;
@@ -92,7 +92,7 @@ fn is_big_endian(bytes: &[u8]) -> Result<bool, Broken> {
 struct Reader {
     part: Part,
     bytes: Box<dyn Read>,
-    /// Unpacked bytes so far, and all of them.
+    /// Number of bytes unpacked so far, and in total.
     at: u64,
     end: u64,
     /// Offset in the file.
@@ -120,7 +120,7 @@ impl Reader {
         })
     }
 
-    /// Whether a compressed element is an array, whose size is then known.
+    /// Whether a compressed element is an array; its size is then known.
     fn is_array(&mut self) -> Result<bool, Broken> {
         self.end = 8;
         let (kind, size) = (self.whole("a type")?, self.whole("a size")?);
@@ -136,7 +136,7 @@ impl Reader {
         Ok(kind == MATRIX)
     }
 
-    /// A copy with the rest of its bytes in memory.
+    /// A copy with the remaining bytes in memory.
     fn kept(mut self) -> Result<Self, Broken> {
         let (mut bytes, length) = (Vec::new(), self.end - self.at);
         let read = (&mut self.bytes).take(length).read_to_end(&mut bytes);
@@ -192,7 +192,7 @@ impl Reader {
 
     fn tag(&mut self, what: &str) -> Result<Tag, Broken> {
         let first = self.whole(what)?;
-        // A short one has its size in the upper half of its type, and four bytes.
+        // A short element has its size in the upper half of its type, and four bytes of content.
         if first >> 16 != 0 {
             let (kind, size) = (first & 0xffff, first >> 16);
             if size > 4 {
@@ -219,7 +219,7 @@ impl Reader {
         Ok(bytes)
     }
 
-    /// A number from zero on in an element; zero if there is none.
+    /// The number at this index (from zero) in an element; zero if there is none.
     fn count(&self, bytes: &[u8], index: usize) -> usize {
         let number = Kind::I32.number(bytes.get(4 * index..).unwrap_or_default(), self.big_endian);
         number.unwrap_or(0.0).max(0.0) as usize
@@ -251,7 +251,7 @@ impl Reader {
             STRUCT if shape.iter().all(|&size| size == 1) && depth < DEEPEST => {
                 self.structure(&name, depth, arrays)?;
             }
-            // Numbers, from double to uint64.
+            // Numeric classes, from double to uint64.
             6..=15 => arrays.extend(self.numbers(name, shape)?),
             _ => {}
         }
@@ -283,7 +283,7 @@ impl Reader {
         Ok(())
     }
 
-    /// An array of the numbers at this place; `None` if it has none.
+    /// The array of numbers at this place; `None` if the array is not numeric.
     fn numbers(&mut self, name: String, shape: Vec<usize>) -> Result<Option<Array>, Broken> {
         let Tag { kind, size, .. } = self.tag("numbers")?;
         let Some(kind) = number_kind(kind) else {

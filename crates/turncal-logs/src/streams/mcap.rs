@@ -130,7 +130,7 @@ impl Mcap {
         self.at = 0;
         let mut found = flate2::Crc::new();
         found.update(&self.chunk);
-        // Zero stands for none.
+        // Zero means that there is no checksum.
         if sum != 0 && found.sum() != sum {
             self.chunk.clear();
             return Err(Broken::new(

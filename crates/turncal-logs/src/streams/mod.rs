@@ -67,7 +67,7 @@ const CLOSED: [(&[u8], &str, &str); 2] = [
     ),
 ];
 
-/// Opens a log according to its content; `None` if it is not such a log, but perhaps text.
+/// Opens a log according to its content; `None` if the file is not a supported binary log (it may be text).
 pub fn open(path: &DataFile) -> Result<Option<Box<dyn Log>>, FileError> {
     if path.table().is_some() {
         return Ok(None);
@@ -104,7 +104,7 @@ impl Format {
 impl Broken {
     /// Converts to a file error.
     fn of(&self, file: &Path, advice: &str) -> FileError {
-        // Zero where the format does not tell the place.
+        // Zero if the format does not give the position.
         let place = match self.offset {
             0 => Place::File,
             offset => Place::Byte(offset),

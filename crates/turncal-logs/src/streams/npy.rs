@@ -1,6 +1,6 @@
 //! NumPy arrays, single (`.npy`) and in an archive (`.npz`).
 //!
-//! Arrays of the same number of rows are one stream; an array of several columns gives `name[0]`, `name[1]`, …
+//! Arrays with the same number of rows form one stream; an array of several columns gives `name[0]`, `name[1]`, …
 //!
 //! Source: NumPy Enhancement Proposal 1, "A Simple File Format for NumPy Arrays".
 
@@ -96,7 +96,7 @@ struct Member {
 }
 
 impl Member {
-    /// The array, and its omitted parts.
+    /// The array, and a remark on omitted parts.
     fn array(self) -> Result<(Array, Option<String>), Broken> {
         let Self {
             name,
@@ -109,7 +109,7 @@ impl Member {
             let Some(sum) = sum else {
                 return part.open(skip);
             };
-            // The checksum is that of all bytes.
+            // The checksum covers all bytes.
             let bytes = CrcReader::new(part.open(0)?);
             let mut bytes = Checked { bytes, sum };
             pass(&mut bytes, skip)?;

@@ -48,7 +48,7 @@ pub fn survey(file: &Path, mut log: Box<dyn Log>) -> (Vec<Found>, Option<FileErr
                 if samples.len() <= stream {
                     samples.resize(stream + 1, 0);
                 }
-                // The first shows whether there is something to say of the stream, which others may add to.
+                // The first sample shows whether there are remarks on the stream; later samples may add to them.
                 let is_told = |of: &Stream| !of.remarks.is_empty();
                 if (samples[stream] == 0 || is_told(&log.streams()[stream]))
                     && let Err(broken) = log.values(&mut row)
@@ -69,7 +69,7 @@ const CUT_OFF: &str = "Copy or record the file again, or set `salvage = true` to
                        before this point.";
 
 impl StreamRows {
-    /// Opens a stream, which must have a sample; without a name, the only one.
+    /// Opens a stream with at least one sample; without a name, the only stream.
     pub fn open(
         file: &DataFile,
         mut log: Box<dyn Log>,
@@ -98,7 +98,7 @@ impl StreamRows {
             }
         };
         if let (None, None, &[_]) = (stream, name, &with_samples[..]) {
-            // The file was read to its end to know that there is no other.
+            // The file was read to its end to ensure that there is no other stream.
             let only = log.streams()[with_samples[0]].name.clone();
             let again = super::open(file)?.ok_or_else(|| changed(file))?;
             return Self::open(file, again, Some(&only), salvage);
@@ -158,7 +158,7 @@ impl Rows for StreamRows {
         &self.log.streams()[self.stream].remarks
     }
 
-    /// Also false at damage if the part before it is to be used.
+    /// The result is also false at damage, if the part before it is to be used.
     fn advance(&mut self, _used: &[usize]) -> Result<bool, FileError> {
         if self.is_ahead {
             self.is_ahead = false;

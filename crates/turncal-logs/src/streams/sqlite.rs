@@ -11,7 +11,7 @@ const LEAF: u64 = 13;
 const DEEPEST: usize = 32;
 
 pub enum Value {
-    /// Null, or a real number, which does not occur in the columns read.
+    /// Null, or a real number (which does not occur in the columns read).
     Null,
     Whole(i64),
     Bytes(Vec<u8>),
@@ -183,7 +183,7 @@ impl Database {
             let child = if cell < page.cells {
                 page.cell(cell)?.whole(4, "a page number")?
             } else {
-                // Behind all cells.
+                // Position after all cells.
                 let mut header = big_endian(&page.bytes[page.begin + 8..], page.offset);
                 header.whole(4, "a page number")?
             };
@@ -197,7 +197,7 @@ impl Database {
         }
     }
 
-    /// Number and content of a row, which may continue on overflow pages.
+    /// Number and content of a row; the content may continue on overflow pages.
     fn payload(&mut self, cell: &mut Slice) -> Result<(i64, Vec<u8>), Broken> {
         let offset = cell.offset();
         let size = varint(cell)?;

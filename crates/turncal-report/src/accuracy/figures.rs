@@ -1,4 +1,4 @@
-//! Ratios of RMS errors with their intervals: to the bound, and of the closed form to the filter.
+//! Ratios of RMS errors with their intervals: error to bound, and closed form to filter.
 
 use crate::accuracy::tables::compared;
 use crate::prelude::*;
@@ -9,7 +9,7 @@ const NARROWEST: f64 = 1.08;
 /// Margin at both ends of the axis, as a fraction of its length.
 const FREE: f64 = 0.2;
 
-/// A ratio of a quantity, if the study has it.
+/// A ratio for a quantity, if the study has it.
 type OfFigures = fn(&Figures) -> Option<Ratio>;
 
 /// Error over bound, and error of the closed form over that of the filter.
@@ -42,7 +42,8 @@ pub fn figures(accuracy: &Accuracy) -> [Plot; 2] {
     ]
 }
 
-/// Ratios by name, each with its interval and, beyond the interval's end away from the line at 1, its value.
+/// Ratios by name, each with its interval and its value, printed at the end of the interval that is farther from the
+/// line at 1.
 fn ratios(accuracy: &Accuracy, title: &str, all: &[(String, OfFigures)]) -> Panel {
     let compared = compared(accuracy);
     let (mut low, mut high) = (1.0, 1.0);

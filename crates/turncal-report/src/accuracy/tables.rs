@@ -9,7 +9,7 @@ use turncal::study::{Accuracy, Figures, Ratio};
 
 const AGAINST_BOUND: &str = "| unit | RMS error | RMS σ | RMS bound | error/bound | 99 % interval";
 
-/// A quantity with expected value one, with the digits that are significant given its interval.
+/// A quantity with expected value one, with the digits that its interval allows.
 pub fn mean(mean: f64, (low, high): (f64, f64)) -> String {
     if mean < 10.0 {
         value(mean, 0.5 * (high - low))
@@ -40,7 +40,7 @@ fn sections(
         .collect()
 }
 
-/// RMS error, σ and bound in a unit, and the ratio of the first to the last.
+/// RMS error, σ and bound in a unit, and the ratio of error to bound.
 fn against_bound(of: &Figures, unit: f64) -> Vec<String> {
     let rms = [of.filter, of.claimed, of.bound].map(|rms| three_digits(rms / unit));
     rms.into_iter()
@@ -52,7 +52,7 @@ pub fn bound(accuracy: &Accuracy) -> Table {
     let cells = |of: &Compared| against_bound(of.figures, of.unit_value);
     Table::new("EKF against the Cramér–Rao bound", columns(AGAINST_BOUND))
         .sections(sections(accuracy, cells))
-        .note("RMS over all runs and the parameters of a group; σ: stated by the filter.")
+        .note("RMS over all runs and all parameters of a group; σ: as computed by the filter.")
         .note("Position: horizontal, after 40 h from perfect alignment; flight: on the trajectory flight.")
         .note("Bound: Bayesian Cramér–Rao bound from a pass linearised at the truth. Interval: bootstrap over runs.")
 }
@@ -68,7 +68,7 @@ pub fn auxiliary(accuracy: &Accuracy) -> Table {
         columns(AGAINST_BOUND),
     )
     .section(accuracy.error_terms.iter().map(row))
-    .note("RMS over all runs and the parameters of a term.")
+    .note("RMS over all runs and all parameters of a term.")
 }
 
 pub fn gain(accuracy: &Accuracy) -> Table {
@@ -123,8 +123,8 @@ pub fn consistency(accuracy: &Accuracy) -> Table {
 ))
         .section(nees.into_iter().chain(nis))
         .note("NEES/n: squared errors normalised by the stated covariance; NIS: squared innovations normalised by \
-            theirs.")
-        .note("Both are 1 if σ are correct; intervals from χ².")
+               their predicted covariance.")
+        .note("Both are 1 if the σ are correct; intervals from χ².")
 }
 
 fn nis_row(name: &str, nis: &Nis) -> Vec<String> {
@@ -182,7 +182,7 @@ pub fn compared(accuracy: &Accuracy) -> Vec<Compared<'_>> {
     groups.chain(positions).collect()
 }
 
-/// A mission in a word.
+/// A mission in one word.
 pub fn journey_name(journey: Journey) -> &'static str {
     match journey {
         Journey::Standing => "stationary",

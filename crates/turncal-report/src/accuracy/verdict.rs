@@ -101,7 +101,7 @@ fn against_bound(accuracy: &Accuracy) -> (bool, String) {
     if !form.holds(truth) {
         let text = format!(
             "The {} form cannot represent the truth, which is {}. Relative to the bound of the general form, the \
-             errors are larger by a factor of: {}.",
+             errors are larger by these factors: {}.",
             form.name(),
             truth.name(),
             named(accuracy, of, |_| true)
@@ -135,8 +135,8 @@ fn nees(accuracy: &Accuracy) -> (bool, String) {
              correlations."
         ),
         (Ordering::Equal, _) => format!(
-            "ANEES {mean} is outside its 95 % interval {inner}, which happens in one study of twenty, but within its \
-             99.8 % interval {outer}."
+            "ANEES {mean} is outside its 95 % interval {inner}, as happens in one study in twenty, but within its 99.8 \
+             % interval {outer}."
         ),
         (_, side) => format!(
             "ANEES {mean} is {side} its 99.8 % interval {outer}: the stated σ are too {} (errors are {} times σ).",
@@ -147,7 +147,7 @@ fn nees(accuracy: &Accuracy) -> (bool, String) {
     (side(of.mean, of.interval_998).0.is_eq(), text)
 }
 
-/// Sentences on innovations of the wrong size or whiteness.
+/// Sentences on innovations that have the wrong size or are not white.
 fn innovations(accuracy: &Accuracy, name: &str, nis: &Nis) -> Vec<(bool, String)> {
     let mut sentences = Vec::new();
     if let (Ordering::Less | Ordering::Greater, side) = side(nis.mean, nis.interval) {

@@ -68,7 +68,7 @@ fn axis(axis: &AxisNoise, sensor: Sensor) -> Value {
         let of = quantity(hidden.process, sensor);
         (of.key.to_owned(), (hidden.limit / of.value).into())
     });
-    // Often read as bias instability, whether or not its slope is detected.
+    // The minimum is often read as bias instability, whether or not its slope is detected.
     let floor = Process::BiasInstability.allan_variance(1.0).sqrt();
     let lowest = axis.minimum().map(|(tau, deviation)| {
         let deviation = deviation / unit;

@@ -79,7 +79,7 @@ fn panel(
     panel.with_all(lowest.map(|at| Series::marks(Mark::Ring, [at]).color(Color::Ink)))
 }
 
-/// Such as `N = 0.448 °/√h`.
+/// A coefficient with its unit, such as `N = 0.448 °/√h`.
 fn coefficient(found: &Found, sensor: Sensor) -> String {
     let of = quantity(found.process, sensor);
     let strength = three_digits(found.strength / of.value);

@@ -83,7 +83,7 @@ fn correlation_time(found: Found) -> String {
         return NONE.to_owned();
     };
     match found.sigma_log_time {
-        // If it is known only to within a factor, σ is that of its logarithm.
+        // If the value is known only to within a factor, σ is that of its logarithm.
         Some(of) if of > 0.5 => {
             format!(
                 "{} ×÷ {}",

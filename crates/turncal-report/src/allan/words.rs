@@ -50,8 +50,9 @@ pub fn warnings(analysis: &NoiseAnalysis) -> Vec<String> {
                     "{name} {letter}: no process fits its deviations."
                 )),
                 Some(of) if of.misfit > SMALL => warnings.push(format!(
-                    "{name} {letter}: its deviations differ from every sum of processes by {} %, which σ include. \
-                     Possible causes are vibration, filters, temperature steps, or pulses coarser than the noise.",
+                    "{name} {letter}: its deviations differ by {} % from any sum of processes, and the σ include this \
+                     misfit. Possible causes are vibration, filters, temperature steps, or pulses coarser than the \
+                     noise.",
                     // The relative error of a deviation is half of that of a variance.
                     sigma(50.0 * of.misfit)
                 )),

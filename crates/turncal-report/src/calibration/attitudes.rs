@@ -13,7 +13,7 @@ const FAR: f64 = 45.0 * DEGREE;
 const RIM: f64 = 0.087;
 /// Half the width of a map of a hemisphere, whose radius is 1.
 const ROOM: f64 = 1.22;
-/// Points of a circle.
+/// Number of points of a circle.
 const CIRCLE: usize = 121;
 
 /// An axis, and 1 if it points up or −1 if it points down.
@@ -28,7 +28,7 @@ const POSITIONS: [Position; 6] = [
 ];
 
 impl Report<'_> {
-    /// The upward directions of all dwells along body axes, and those of the six positions that no dwell is near.
+    /// The upward directions of all dwells along body axes, and those of the six positions that have no dwell nearby.
     pub fn attitudes(&self) -> Option<Plot> {
         let rests = rests(self.run);
         let near = |rest: &Rest, (axis, sign): Position| {
@@ -46,8 +46,8 @@ impl Report<'_> {
         let far = FAR / DEGREE;
         let caption = format!(
             "Dots: upward direction along the body axes in each dwell, in an equal-area map of the two hemispheres. \
-             Inner circle: {far:.0}° from the pole. Rings: positions with an axis up or down that are more than {far:.0}° \
-             from every dwell. Missing of the six positions: {missing}."
+             Inner circle: {far:.0}° from the pole. Rings: positions with an axis up or down that are more than \
+             {far:.0}° from every dwell. Missing positions (of the six): {missing}."
         );
         let plot = Plot::new("attitudes.svg", "Attitudes reached", (3, 420), panels);
         (!rests.is_empty()).then(|| plot.caption(caption))
@@ -57,7 +57,7 @@ impl Report<'_> {
 /// The hemisphere with z up (1) or down (−1), seen from outside.
 fn hemisphere(rests: &[Rest], missing: &[Position], side: f64) -> Panel {
     let map = |[x, y, z]: [f64; 3]| {
-        // Lambert's azimuthal projection: areas are in proportion.
+        // Lambert's azimuthal equal-area projection.
         let scale = (1.0 + side * z).max(0.0).sqrt().recip();
         (x * scale, side * y * scale)
     };

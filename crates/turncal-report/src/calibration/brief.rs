@@ -61,7 +61,7 @@ fn accuracy(report: &Report, estimate: &Estimate) -> Table {
         row
     };
     let mut table = Table::new("", columns).section(Group::all().map(row));
-    // A narrow terminal does without the last columns, but first without the error that was not to be lowered.
+    // A narrow terminal omits the last columns, but first the error of the method that was not the subject.
     let (first, others): (Vec<_>, Vec<_>) =
         (2..table.columns.len()).partition(|column| table.columns[*column] == "closed form error");
     table.optional = [others, first].concat();

@@ -9,7 +9,7 @@ use turncal::imu::Sensor;
 const SHOWN: usize = 5;
 /// Usual resolution of a stated latitude, rad.
 const LATITUDE: f64 = 1e-3 * DEGREE;
-/// A source is named if it contributes at least this fraction of a variance.
+/// A source is shown if it contributes at least this fraction of a variance.
 const NAMED: f64 = 1e-3;
 
 /// RMS of the standard uncertainties of a group, by source and combined.
@@ -50,14 +50,14 @@ pub fn table(budget: &Budget, estimate: &Estimate) -> Table {
              calibration.json lists all of them per parameter.",
         )
         .note(
-            "ν: degrees of freedom of each source, infinite if stated. k: from Student's t with the effective \
-             degrees of freedom, largest of the group.",
+            "ν: degrees of freedom of each source, infinite if stated. k: from Student's t with the effective degrees \
+             of freedom; the largest in the group.",
         );
     table.notes.extend(taken_as_exact(budget));
     table
 }
 
-/// Inputs that are no source of the budget, with their effect on the parameters.
+/// Inputs that are not in the budget, with their effect on the parameters.
 fn taken_as_exact(budget: &Budget) -> Option<String> {
     let latitude = format!(
         "the latitude of the site (0.001° changes gyro biases by up to {} °/h)",

@@ -6,7 +6,7 @@ use turncal::calibration::{Estimate, ParameterVector, to_vector};
 
 /// Half the width of a prior or limit.
 const HALF: f64 = 0.35;
-/// Standard deviations of an error bar.
+/// Half length of an error bar, in standard deviations.
 const SIGMAS: f64 = 2.0;
 
 impl Report<'_> {
@@ -18,8 +18,8 @@ impl Report<'_> {
         });
         let panels =
             Group::all().filter_map(|group| self.of_group(group, estimate, prior.as_ref()));
-        let mut caption = "Each parameter with an error bar of ±2σ, which is shorter than its dot if the parameter is \
-             well determined; scale factors as deviation from nominal. Bands: prior mean ±1σ."
+        let mut caption = "Each parameter with an error bar of ±2σ (hidden by the dot if the parameter is well \
+                           determined); scale factors as deviation from nominal. Bands: prior mean ±1σ."
             .to_owned();
         if self.specification.is_some() {
             caption += " Dashed: limits of the specification; a prior may extend beyond the axes.";
@@ -68,7 +68,7 @@ impl Report<'_> {
         let names = indices.iter().map(|&i| axis_name(estimate.form(), i));
         let mut y = Axis::linear("").including([0.0]).room(0.08, 0.08);
         if !limits.is_empty() {
-            // Beside limits, a wide prior would hide what they decide.
+            // Next to limits, a wide prior would hide whether they are met.
             let ends = bars
                 .iter()
                 .flat_map(|(_, value, bar)| [value - bar, value + bar]);

@@ -6,9 +6,9 @@ use turncal::calibration::{Epoch, Estimate, Innovation, Observation, Outcome};
 use turncal::imu::{AXES, Sensor};
 use turncal::recording::ImuSamples;
 
-/// Beyond this an innovation is drawn at the edge.
+/// Innovations beyond this limit are drawn at the edge.
 const EDGE: f64 = 6.0;
-/// Up to this many innovations are drawn as dots, more as a line through the extremes.
+/// Maximum number of innovations drawn as dots; more are drawn as a line through the extremes.
 const DOTS: usize = 150;
 /// Weaker correlations are not printed, because they would hide the strong ones.
 const WRITTEN: f64 = 0.2;
@@ -29,7 +29,7 @@ impl Report<'_> {
         plots
     }
 
-    /// The filter result if it has a single time axis, which several recordings do not.
+    /// The filter result if it has a single time axis; several recordings do not have one.
     pub fn against_time(&self) -> Option<&Outcome> {
         self.outcome.filter(|outcome| outcome.alone.len() < 2)
     }
@@ -144,7 +144,7 @@ fn correlation(estimate: &Estimate) -> Option<Plot> {
     for (row, &i) in indices.iter().enumerate() {
         for (column, &j) in indices.iter().enumerate() {
             let r = estimate.covariance[(i, j)] / (sigma[i] * sigma[j]);
-            // The first row is the uppermost.
+            // The first row is at the top.
             let (x, y) = (column as f64, (indices.len() - 1 - row) as f64);
             let half = 0.45 * r.abs().min(1.0);
             if row > column && half > FAINT {
@@ -164,9 +164,9 @@ fn correlation(estimate: &Estimate) -> Option<Plot> {
     panel.square = true;
     let plot = Plot::new("correlation.svg", "Correlations", (1, 860), [panel]).caption(format!(
         "Correlation of the estimated parameters. Below the diagonal the side of a square grows with the magnitude; \
-         blue squares are positive, orange ones negative. Above the diagonal, a wide figure gives the coefficient in \
-         hundredths if its magnitude is at least {WRITTEN}. This path determines strongly correlated parameters only as a sum or \
-         difference, not individually."
+         blue squares are positive, orange ones negative. If the figure is wide enough, the coefficient is given in \
+         hundredths above the diagonal where its magnitude is at least {WRITTEN}. This path determines strongly \
+         correlated parameters only as a sum or difference, not individually."
     ));
     (!indices.is_empty()).then_some(plot)
 }
@@ -185,7 +185,7 @@ fn path(report: &Report) -> Plot {
         .caption("Raw gyro output about the body axes. Grey: dwells, numbered where space permits.")
 }
 
-/// Mean of each sample of a triad along each body axis, in a unit per second.
+/// Mean over each sample of a triad along each body axis, in this unit per second.
 pub fn samples(imu: &ImuSamples, sensor: Sensor, unit: f64) -> [Series; 3] {
     let of = match sensor {
         Sensor::Gyro => &imu.gyro,

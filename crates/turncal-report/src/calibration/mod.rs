@@ -27,7 +27,8 @@ pub use report::{ClosedForm, Report};
 pub use solved::{Truth, document, dwell_times, note, within};
 pub use tables::cross_validation;
 
-/// The most severe first; of one level, the first of each kind before more of any, and before what the reader assumed.
+/// Order of findings: the most severe first; within a level, the first of each kind, then further ones of a kind, then
+/// the assumptions of the reader.
 pub fn in_order(findings: &[Finding]) -> Vec<Finding> {
     let mut seen = BTreeSet::new();
     let keyed = findings.iter().map(|finding| {
@@ -86,7 +87,7 @@ impl Report<'_> {
         document
     }
 
-    /// Recording, date and files, as far as the title does not name them.
+    /// Recording, date and files, unless they are in the title.
     fn origin(&self) -> Option<String> {
         let recording = &self.run.recording;
         let name = (recording.name != self.title).then(|| format!("Recording {}", recording.name));

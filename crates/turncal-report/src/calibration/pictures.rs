@@ -29,7 +29,7 @@ fn the_figure_of_the_readme_is_that_of_the_demo() {
     let of = (&checked, &checked.consequences(&problem, None));
     let document = document((&problem, "demo"), of, Some(&truth));
     let plot = document.plots().find(|plot| plot.file == "sigma.svg");
-    // README is read in a column as narrow as a printed page.
+    // README is displayed in a column as narrow as a printed page.
     let drawn = svg::draw_at(plot.unwrap(), svg::WIDTHS[1]);
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../.readme/sigma.svg");
     if std::env::var("INSTA_UPDATE").is_ok_and(|update| update == "always") {
@@ -65,14 +65,14 @@ fn a_value_is_shown_between_the_limits_of_its_specification() {
 fn a_position_that_every_dwell_is_far_from_is_missing() {
     let mut made_up = synthetic(InstallationForm::General);
     let caption = |made_up: &Synthetic| made_up.report().attitudes().unwrap().caption;
-    assert!(caption(&made_up).contains("positions: none"));
+    assert!(caption(&made_up).contains("(of the six): none"));
     let imu = &mut made_up.run.recording.imu;
     let dwell = made_up.dwells[0].clone();
     let first = (dwell.end / imu.period) as usize;
     imu.gyro.to_mut().truncate(first);
     imu.accel.to_mut().truncate(first);
     made_up.run.recording.table = None;
-    assert!(caption(&made_up).contains("positions: x up"));
+    assert!(caption(&made_up).contains("(of the six): x up"));
 }
 
 #[test]

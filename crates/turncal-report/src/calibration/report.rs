@@ -19,7 +19,7 @@ use turncal::survey::Expected;
 pub struct Report<'a> {
     /// Heading of the page.
     pub title: &'a str,
-    /// The record.
+    /// The recording.
     pub run: &'a Run,
     /// Observations at rest.
     pub aiding: Aiding,
@@ -61,7 +61,7 @@ pub struct ClosedForm<'a> {
 }
 
 impl Report<'_> {
-    /// The estimate that the report is about.
+    /// The estimate that the report describes.
     pub fn estimate(&self) -> Option<&Estimate> {
         let filtered = self.outcome.map(|outcome| &outcome.estimate);
         filtered.or(self.closed_form.map(|closed| closed.estimate))

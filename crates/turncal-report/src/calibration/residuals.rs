@@ -4,8 +4,8 @@ use super::tables::{ANGLE, FORCE};
 use crate::prelude::*;
 use turncal::calibration::{DwellResidual, Quality};
 
-/// Magnitude of the residuals of gravity in each dwell and after each move, by the nominal and the calibrated
-/// instrument; dwells excluded from a fit as rings.
+/// Magnitude of the gravity residuals in each dwell and after each move, for the nominal and the calibrated instrument;
+/// rings mark dwells excluded from a fit.
 pub fn figure(quality: &Quality) -> Plot {
     let panel = |name: &str, place: &str, units, of: fn(&DwellResidual) -> Option<f64>| {
         let points = |dwells: &[DwellResidual]| -> Vec<Point> {
@@ -47,9 +47,9 @@ pub fn figure(quality: &Quality) -> Plot {
         panels,
     )
     .caption(
-        "|f| − gravity: deviation of the mean specific force of each dwell from gravity. Direction: angle after each \
-         move between the vertical that the gyros carried over from the dwell before and the vertical that the \
-         accelerometers measure. Crosses: the nominal instrument, without calibration. Dots: the calibrated \
-         instrument. Rings: an instrument calibrated without that dwell.",
+        "|f| − gravity: deviation of the mean specific force of each dwell from gravity. Direction: angle, after each \
+         move, between the vertical carried over from the previous dwell by the gyros and the vertical measured by the \
+         accelerometers. Crosses: the nominal instrument, without calibration. Dots: the calibrated instrument. Rings: \
+         an instrument calibrated without that dwell.",
     )
 }

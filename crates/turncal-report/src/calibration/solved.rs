@@ -28,7 +28,7 @@ pub fn document(
     within((problem, name), (checked, consequences), truth, None)
 }
 
-/// The same with the limits that the calibration is to keep.
+/// Adds the limits that the calibration must meet.
 pub fn within(
     (problem, name): (&Problem, &str),
     (checked, consequences): (&CheckedCalibration, &Consequences),

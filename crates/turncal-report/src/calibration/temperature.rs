@@ -6,7 +6,7 @@ use turncal::calibration::{
 };
 use turncal::imu::{InstallationForm, RATE, Sensor};
 
-/// Points of a curve.
+/// Number of points of a curve.
 const POINTS: usize = 81;
 
 /// Change of parameters with temperature, if they depend on it.
@@ -76,8 +76,8 @@ pub fn orders(form: InstallationForm, thermal: &Thermal) -> Table {
             rows.filter_map(|i| row(group, i)).collect::<Vec<_>>()
         }))
         .note(format!(
-            "Legendre coefficients ± 1σ over {ranges}: change of the parameter over half the range. Each \
-             order is averaged over being absent and its usual sizes."
+            "Legendre coefficients ± 1σ over {ranges}: change of the parameter over half the range. Each order is \
+             averaged over its absence and its usual sizes."
         ))
 }
 

@@ -13,14 +13,14 @@ pub struct AsFound {
     pub earlier: String,
     /// Common body frame.
     pub body_frame: BodyFrame,
-    /// Every parameter that both have.
+    /// Every parameter that both calibrations have.
     pub changes: Vec<Change>,
 }
 
 /// Change of a parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Change {
-    /// Earlier value, with the uncertainty of the earlier calibration: zero if that states none.
+    /// Earlier value, with the uncertainty of the earlier calibration (zero if not stated).
     pub found: Measured,
     /// Value now.
     pub left: Measured,
@@ -32,8 +32,8 @@ impl Change {
         self.left.value - self.found.value
     }
 
-    /// Expanded uncertainty of the difference, as if both came from independent data; `None` if the earlier calibration
-    /// states none.
+    /// Expanded uncertainty of the difference, as if both calibrations were from independent data; `None` if the
+    /// earlier calibration states none.
     pub fn expanded(&self) -> Option<f64> {
         let (found, left) = (self.found.expanded, self.left.expanded);
         (found > 0.0).then(|| found.hypot(left))

@@ -24,7 +24,7 @@ pub enum Decision {
 }
 
 impl Decision {
-    /// In words.
+    /// The decision in words.
     pub fn words(self) -> &'static str {
         match self {
             Self::Pass => "pass",
@@ -34,7 +34,7 @@ impl Decision {
         }
     }
 
-    /// Its code in the Digital Calibration Certificate.
+    /// Code of the decision in the Digital Calibration Certificate.
     pub fn code(self) -> &'static str {
         match self {
             Self::Pass => "pass",

@@ -26,7 +26,7 @@ pub fn write(certificate: &Certificate) -> String {
     indented(&xml.into_string())
 }
 
-/// XML with a line for each element; an element without elements is on one line.
+/// XML with a line for each element; an element without child elements is on one line.
 fn indented(xml: &str) -> String {
     let mut text = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>".to_owned();
     let (mut depth, mut is_open) = (0usize, false);
@@ -291,7 +291,7 @@ fn description(certificate: &Certificate) -> String {
     text
 }
 
-/// Parameters as found, with their own uncertainties; those as left are the results in the same body frame.
+/// Parameters as found, with their own uncertainties; parameters as left are the results in the same body frame.
 fn found(as_found: &AsFound) -> Markup {
     let about = format!(
         "Valid when the item was received, from {}; general installation form, body frame: {}.",
@@ -324,7 +324,7 @@ fn quantity(of: &Measured, id: Option<&str>, kind: Option<&str>) -> Markup {
     }
 }
 
-/// All parameters in the order of the quantities before, with their covariance and joint coverage region.
+/// All parameters in the order of the preceding quantities, with their covariance and joint coverage region.
 fn together(results: &[Measured], covariance: &[Vec<f64>]) -> Markup {
     let units: Vec<&str> = results.iter().map(|of| of.quantity.si_unit()).collect();
     let values: Vec<String> = results.iter().map(|of| number(of.value)).collect();

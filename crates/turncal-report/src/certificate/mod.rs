@@ -28,8 +28,8 @@ pub enum CertificateError {
     },
     /// The earlier calibration must not be used.
     #[error(
-        "the verdict of the earlier calibration, {name}, is FAILED, so it does not show the state as found. Give the last \
-         calibration that is valid, or none."
+        "the verdict of the earlier calibration, {name}, is FAILED, so it does not show the state as found. Give the \
+         last valid calibration, or none."
     )]
     Earlier {
         /// Its name.
@@ -135,8 +135,7 @@ impl Certificate {
         })
     }
 
-    /// Remarks for the customer: what the certificate applies to, those of the laboratory, and the findings of the
-    /// evaluation.
+    /// Remarks for the customer: scope of the certificate, remarks of the laboratory, and findings of the evaluation.
     pub fn remarks(&self) -> Vec<String> {
         let general = [
             "The results relate only to the item named above, in the state and under the conditions stated.",

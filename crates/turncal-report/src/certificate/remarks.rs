@@ -4,14 +4,14 @@ use super::in_words;
 use turncal::calibration::Finding;
 use turncal::calibration::FindingKind as Kind;
 
-/// A sentence per kind of finding; a kind that this version does not know is named by its code.
+/// A sentence per kind of finding; a kind unknown to this version is given by its code.
 pub fn sentences(findings: &[Finding]) -> Vec<String> {
     let mut all: Vec<String> = Vec::new();
     for finding in findings {
         let kind = Kind::named(&finding.kind);
         let sentence = match kind {
             Some(kind) => with_parameters(kind.remark(), finding),
-            None => format!("The evaluation has the finding {}.", finding.code),
+            None => format!("The evaluation has finding {}.", finding.code),
         };
         if !all.contains(&sentence) {
             all.push(sentence);

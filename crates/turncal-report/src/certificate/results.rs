@@ -43,7 +43,7 @@ impl Quantity {
         }
     }
 
-    /// Its SI unit as D-SI spells it.
+    /// Its SI unit in D-SI notation.
     pub fn si_unit(self) -> &'static str {
         match self {
             Self::Term(term) => term.entry().d_si_unit,

@@ -17,12 +17,12 @@ pub fn degrees(angle: f64) -> String {
     value(angle / DEGREE, 1.0)
 }
 
-/// Such as `x up`.
+/// Direction of an axis, such as `x up`.
 pub fn way_up(axis: usize, down: bool) -> String {
     format!("{} {}", AXES[axis], if down { "down" } else { "up" })
 }
 
-/// Such as `x +360.0°`; for a turn about several axes, only the angle.
+/// Axis and angle of a turn, such as `x +360.0°`; for a turn about several axes, only the angle.
 pub fn turn(turn: &Turn) -> String {
     match turn.body_axis() {
         Some(axis) => format!("{} {}°", AXES[axis], signed(turn.angle)),
@@ -178,7 +178,7 @@ fn of_methods(survey: &Survey) -> Vec<String> {
         Vec::new()
     } else {
         vec![format!(
-            "With every method, σ of {} would stay above half of the prior. Add positions and turns.",
+            "With every method, the σ of {} would stay above half of the prior. Add positions and turns.",
             always.join(", ")
         )]
     }

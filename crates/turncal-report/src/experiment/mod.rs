@@ -65,7 +65,7 @@ fn facts(experiment: &Experiment) -> Facts {
             "noise",
             format!(
                 "not included in the errors of the methods, because it is the same for all; the line \"noise alone\" \
-                 shows its effect in alignment of {} and navigation",
+                 shows its effect on an alignment of {} and on navigation",
                 minutes(ALIGNMENT_TIME)
             ),
         ),

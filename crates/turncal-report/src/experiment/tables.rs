@@ -102,7 +102,7 @@ pub fn table_time(experiment: &Experiment, estimator: Estimator) -> Option<f64> 
     timed.find_map(|(method, time)| (method.estimator == estimator).then_some(*time))
 }
 
-/// Such as `EKF 10 min, six-angle`.
+/// Name of a method, such as `EKF 10 min, six-angle`.
 pub fn method_name(experiment: &Experiment, method: Method) -> String {
     let estimator = estimator_name(experiment, method.estimator);
     format!("{estimator}, {}", method.form.name())
@@ -115,7 +115,7 @@ pub fn method_kind(estimator: Estimator) -> &'static str {
     }
 }
 
-/// Such as `EKF 10 min`, to the minute; the facts give the exact value.
+/// Name of an estimator with its time to the minute, such as `EKF 10 min`; the facts give the exact value.
 pub fn estimator_name(experiment: &Experiment, estimator: Estimator) -> String {
     let minutes = table_time(experiment, estimator).unwrap_or(f64::NAN) / 60.0;
     format!("{} {minutes:.0} min", method_kind(estimator))

@@ -6,7 +6,7 @@ use turncal::calibration::{AuxiliaryKind, Word};
 use turncal::imu::{AXES, InstallationForm, Sensor};
 use turncal::lot::{Lot, Quantity, Sample, Spread, Verdict};
 
-/// Such as `gyro K x` or `gyro noise x`.
+/// Title of a quantity, such as `gyro K x` or `gyro noise x`.
 pub fn title(quantity: Quantity) -> String {
     match quantity {
         Quantity::Parameter(index) => short_name(InstallationForm::General, index),
@@ -67,7 +67,7 @@ pub fn spread(quantity: Quantity, of: &Spread) -> String {
     match of.interval {
         (low, _) if low > 0.0 => sigma(in_unit(quantity, of.value)),
         (_, high) if high > 0.0 => format!("< {}", sigma(in_unit(quantity, high))),
-        // The scatter is less than the units' σ alone make.
+        // The scatter is smaller than expected from the σ of the units alone.
         _ => "0".to_owned(),
     }
 }

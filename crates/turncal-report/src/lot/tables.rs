@@ -202,7 +202,7 @@ fn push_statistics<'a>(columns: &mut Columns<'a, Quantity>, lot: &'a Lot) {
     }
 }
 
-/// χ²/n, whose exact size is not meaningful far beyond chance.
+/// χ²/n, rounded if far beyond chance.
 fn ratio(of: f64) -> String {
     const FAR: f64 = 1000.0;
     if of > FAR {
@@ -220,7 +220,7 @@ fn flagged(in_sigma: Option<f64>) -> String {
     })
 }
 
-/// The value of one calibration, with the digits of the finest if it states no σ.
+/// The value of one calibration; if it states no σ, with as many digits as the most accurate one.
 fn one(lot: &Lot, row: &Row, quantity: Quantity) -> String {
     let Some(sample) = row.sample(quantity) else {
         return NONE.to_owned();
@@ -267,8 +267,8 @@ fn notes(lot: &Lot, mut table: Table) -> Table {
     }
     if let Some(gravity) = lot.shared_gravity.filter(|_| lot.rows.len() > 1) {
         table = table.note(format!(
-            "The error of gravity, the same for all (1σ {} ppm), is part of every σ of accelerometer K and of their \
-             mean, but not of scatter and differences between calibrations.",
+            "The gravity error, the same for all calibrations (1σ {} ppm), is part of every σ of accelerometer K and \
+             of the σ of their mean, but not of the scatter or of differences between calibrations.",
             sigma(gravity / PPM)
         ));
     }
@@ -284,7 +284,7 @@ fn notes(lot: &Lot, mut table: Table) -> Table {
     }
 }
 
-/// Every limit of a single unit, those that are not kept first; of several those that are not kept, or not certainly.
+/// Every limit of a single unit, exceeded ones first; for several units, only limits that are exceeded or undecided.
 pub fn limits(lot: &Lot) -> Table {
     let row = |row: &Row, check: &Check| {
         let quantity = check.quantity();

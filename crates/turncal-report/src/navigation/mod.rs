@@ -26,7 +26,7 @@ pub struct Navigation<'a> {
     pub truth: &'a str,
     /// Verdict of the calibration; `None` if it was not estimated.
     pub verdict: Option<Word>,
-    /// Whether one of the two has error terms in addition to K, E and D, which navigation does not use.
+    /// Whether one of the two has error terms in addition to K, E and D (navigation does not use them).
     pub terms: bool,
     /// Definition of the body axes.
     pub body_frame: BodyFrame,
@@ -213,7 +213,7 @@ impl Navigation<'_> {
     }
 }
 
-/// One number for each quantity under its key.
+/// One number for each quantity, under its key.
 fn by_key(of: impl Fn(Quantity) -> Option<f64>) -> Map<String, Value> {
     let all = Quantity::ALL.into_iter();
     all.map(|quantity| (quantity.key.to_owned(), of(quantity).into()))

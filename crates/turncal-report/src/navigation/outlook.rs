@@ -143,9 +143,9 @@ pub fn table(heading: &str, navigated: &[MethodOutlook]) -> Table {
         row
     };
     let what = if known {
-        "Computed minus true. σ: of the error at the end, predicted"
+        "Computed minus true. σ: predicted 1σ of the error at the end,"
     } else {
-        "The truth is not known, so no error is shown. σ: at the end, predicted"
+        "The truth is not known, so no error is shown. σ: predicted 1σ of the error at the end,"
     };
     Table::new(heading, columns)
         .sections(Quantity::ALL.chunks(3).map(|of| of.iter().map(|&of| row(of))))

@@ -27,7 +27,7 @@ pub struct Fonts {
 }
 
 impl Fonts {
-    /// `None` if they cannot be read, which the tests exclude.
+    /// `None` if they cannot be read (the tests exclude this).
     pub fn new() -> Option<Self> {
         Some(Self {
             regular: Typeface::new(REGULAR)?,

@@ -33,7 +33,7 @@ pub struct Attached {
     pub bytes: Vec<u8>,
 }
 
-/// The bytes of a PDF/A-3 file; the same for the same document.
+/// The bytes of a PDF/A-3 file; equal documents give equal bytes.
 ///
 /// # Errors [`PdfError`] if a text cannot be shown.
 pub fn write(

@@ -199,7 +199,7 @@ impl Scale {
         }
     }
 
-    /// Length of one place on an axis of names of this length.
+    /// Length of one position on a categorical axis of this length.
     pub fn step(&self, length: f64) -> f64 {
         length / (self.high - self.low)
     }

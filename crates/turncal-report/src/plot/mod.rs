@@ -35,7 +35,7 @@ pub struct Panel {
     pub x: Axis,
     /// Vertical axis.
     pub y: Axis,
-    /// From the back to the front.
+    /// Series, from back to front.
     pub series: Vec<Series>,
     /// Shaded intervals of the horizontal axis.
     pub shading: Vec<Range<f64>>,

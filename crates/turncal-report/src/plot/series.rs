@@ -16,7 +16,7 @@ pub struct Series {
 /// Abscissa and ordinate. A line is interrupted if one of them is not a number.
 pub type Point = (f64, f64);
 
-/// Abscissa, lower and upper end.
+/// Abscissa, lower end and upper end.
 pub type Upright = (f64, f64, f64);
 
 /// Geometry of a series.
@@ -50,11 +50,11 @@ pub enum Mark {
 /// Position of a text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Anchor {
-    /// In the middle above its point.
+    /// Centred above its point.
     Above,
-    /// In the middle below it.
+    /// Centred below its point.
     Below,
-    /// In the middle of it.
+    /// Centred on its point.
     Middle,
 }
 
@@ -76,7 +76,7 @@ pub enum Color {
     Ink,
     /// Colour of unobtrusive elements.
     Quiet,
-    /// The n-th of six.
+    /// The n-th of six colours.
     Nth(usize),
 }
 

@@ -2,7 +2,7 @@
 //! with their hover texts.
 //!
 //! Plotters rounds every coordinate to a whole pixel, so a mark is drawn [`FINE`] times larger and shown at its size.
-//! Sizes here are in shown pixels.
+//! Sizes here are in displayed pixels.
 
 use maud::{PreEscaped, html};
 use plotters::element::{DashedPathElement, Drawable, PointCollection};
@@ -16,9 +16,9 @@ pub use plotters::style::text_anchor::{HPos, VPos};
 
 /// Widths at which every figure is drawn, in pixels: a screen, a printed page or tablet, a telephone.
 pub const WIDTHS: [u32; 3] = [1200, 720, 360];
-/// Drawn pixels in one shown pixel.
+/// Drawn pixels per displayed pixel.
 pub const FINE: f64 = 8.0;
-/// Drawn pixels of the widest and of the highest figure.
+/// Width of the widest and height of the highest figure, in drawn pixels.
 const MOST: u32 = 1 << 20;
 /// Divisor that plotters applies to font sizes in SVG.
 const FONT_RATIO: f64 = 1.24;
@@ -103,7 +103,7 @@ pub fn shortened(text: &str, room: f64) -> String {
 #[derive(Default)]
 pub struct Canvas {
     marks: String,
-    /// Whether marks show their values to a pointer, which only wide screens have.
+    /// Whether marks show their values under a pointer (only wide screens have one).
     pub is_hovered: bool,
 }
 
@@ -134,7 +134,7 @@ impl Canvas {
         drop(area);
         let inside = document.split_once(">\n").map_or("", |(_, inside)| inside);
         let inside = inside.trim_end().trim_end_matches("</svg>");
-        // Plotters states for each mark what the document states for all.
+        // Plotters repeats for each mark the attributes that the document states once.
         let inside = inside.replace(" opacity=\"1\"", "");
         self.marks += &inside.replace(" font-family=\"sans-serif\"", "");
     }
@@ -159,7 +159,7 @@ impl Canvas {
         self.put(DashedPathElement::new(points, px(6.0), px(4.0), style));
     }
 
-    /// The same without dashes in any colour.
+    /// Joins points by a solid line in any colour.
     pub fn stroke(&mut self, points: &[Point], color: RGBColor, width: f64) {
         let points: Vec<_> = points.iter().copied().map(place).collect();
         self.put(PathElement::new(
@@ -185,7 +185,7 @@ impl Canvas {
         self.put(Circle::new(place(at), px(radius), style));
     }
 
-    /// Writes text, the point at this part of it; `scale` 1 is the usual size.
+    /// Writes text, with the point at this position of the text; `scale` 1 is the usual size.
     pub fn text(
         &mut self,
         text: &str,

@@ -11,7 +11,7 @@ use super::words::{LINE, Names, UPWARD, keys, title};
 const TOP: f64 = 26.0;
 /// Space below the names of the horizontal axis.
 const BOTTOM: f64 = 12.0;
-/// Minimum width of a panel beside another.
+/// Minimum width of a panel next to another.
 const NARROWEST: u32 = 340;
 /// Number of lines over which tags are spread.
 const TAG_LINES: usize = 3;
@@ -25,7 +25,7 @@ const CLOSEST: f64 = 10.0;
 /// A panel with its scales.
 type Scaled<'p> = (&'p Panel, (Scale, Scale));
 
-/// Draws it in this width and returns the height of the figure.
+/// Draws the figure in this width and returns its height.
 pub fn draw(on: &mut Canvas, plot: &Plot, width: u32) -> u32 {
     let columns = plot.columns.min((width / NARROWEST).max(1) as usize);
     let panel_width = f64::from(width) / columns as f64;
@@ -58,7 +58,7 @@ pub fn draw(on: &mut Canvas, plot: &Plot, width: u32) -> u32 {
             let is_places = !panel.x.places.is_empty();
             let mut length = across.1 - across.0;
             if panel.square {
-                // The names below it take some of its height.
+                // The names below the panel take some of its height.
                 length = length.min(0.9 * (bottom - top - above));
             }
             let names = Names::new(x, is_places, length, f64::from(plot.height));

@@ -23,7 +23,7 @@ pub fn draw(plot: &Plot) -> String {
     draw_at(plot, WIDTHS[0])
 }
 
-/// The SVG document of a plot of this width: the narrower, the fewer panels stand side by side.
+/// The SVG document of a plot of this width; the narrower it is, the fewer panels are side by side.
 pub fn draw_at(plot: &Plot, width: u32) -> String {
     let mut on = Canvas::default();
     on.is_hovered = width == WIDTHS[0];

@@ -16,7 +16,7 @@ pub fn draw(on: &mut Canvas, frame: &Frame, series: &Series) {
     let (left, right) = frame.across;
     match &series.shape {
         Shape::Line(points) => {
-            // Two points in a pixel look like all.
+            // Two points per pixel look the same as all points.
             let most = 2.0 * (right - left).max(1.0);
             line(
                 on,
@@ -46,7 +46,7 @@ pub fn draw(on: &mut Canvas, frame: &Frame, series: &Series) {
                 Anchor::Below => ((x, y + 5.0), (HPos::Center, VPos::Top)),
                 Anchor::Middle => ((x, y), (HPos::Center, VPos::Center)),
             };
-            // Words in a matrix cell that is too small for them would cover the words of its neighbours.
+            // In a small matrix cell, words would cover those of its neighbours.
             if *anchor != Anchor::Middle || frame.x.step(right - left) > width(text, SMALL) {
                 on.text(text, at, lie, color, SMALL)
             }

@@ -1,11 +1,11 @@
-//! Names along axes and in title lines: broken, turned upward or moved to lines of their own where space is short.
+//! Names along axes and in title lines: broken, turned upward or moved to separate lines if space is short.
 
 use super::super::plot::{Panel, Scale, Series};
 use super::canvas::{LETTER, SMALL, shortened, width};
 
 /// Distance between lines of text.
 pub const LINE: f64 = 17.0;
-/// Relative size of upward names, which stand closest.
+/// Relative size of upward names, which are closest together.
 pub const UPWARD: f64 = 0.87;
 /// Minimum number of letters in a line of a name.
 const LETTERS: usize = 6;
@@ -18,15 +18,15 @@ const SAMPLE: f64 = 28.0;
 
 /// Labels of the horizontal ticks.
 pub enum Names {
-    /// Lines of each, below the axis.
+    /// Lines of each label, below the axis.
     Across(Vec<Vec<String>>),
-    /// Upward.
+    /// Upward labels.
     Upward(Vec<String>),
 }
 
 impl Names {
-    /// Labels of the ticks of an axis of this length, in a panel of this height: places whose names do not fit beside
-    /// each other are named upward.
+    /// Labels of the ticks of an axis of this length, in a panel of this height; names that do not fit side by side are
+    /// written upward.
     pub fn new(x: &Scale, is_places: bool, length: f64, height: f64) -> Self {
         let room = if is_places {
             x.step(length)
@@ -52,7 +52,7 @@ impl Names {
         Self::Upward(x.ticks.iter().map(cut).collect())
     }
 
-    /// Height that they need below the axis.
+    /// Height of the labels below the axis.
     pub fn height(&self) -> f64 {
         match self {
             Self::Across(names) => {
@@ -66,7 +66,7 @@ impl Names {
     }
 }
 
-/// Lines of the title of a panel of this width.
+/// Title lines for a panel of this width.
 pub fn title(panel: &Panel, room: f64) -> Vec<String> {
     if width(&panel.title, 1.0) <= room {
         return vec![panel.title.clone()];
@@ -76,7 +76,7 @@ pub fn title(panel: &Panel, room: f64) -> Vec<String> {
     lines.into_iter().map(|line| line.into_owned()).collect()
 }
 
-/// Lines of named series: one beside the title if there is space, which is the first, else empty.
+/// Lines of named series; the first is next to the title, and empty if there is no space.
 pub fn keys(panel: &Panel, room: f64) -> Vec<Vec<&Series>> {
     let mut lines: Vec<(f64, Vec<&Series>)> = vec![(0.0, Vec::new())];
     for series in &panel.series {

@@ -5,7 +5,7 @@ use crate::prelude::*;
 use turncal::study::Table1;
 use turncal::study::table1::{Column, QUANTITIES};
 
-/// Places of attitude, and of velocity and position, in [`QUANTITIES`].
+/// Positions of attitude, and of velocity and position, in [`QUANTITIES`].
 const ATTITUDE: [usize; 3] = [0, 1, 2];
 const MOTION: [usize; 2] = [3, 4];
 

@@ -7,9 +7,9 @@ use crate::prelude::*;
 use turncal::study::Table1;
 use turncal::study::table1::{AGREEMENT, ByQuantity, Column, Moments, QUANTITIES, Row, paper};
 
-/// Smaller figures, in the units shown, are shown as zero.
+/// Figures smaller than this, in the units shown, are shown as zero.
 const ZERO: f64 = 5e-10;
-/// Differences of more standard errors are shown only as larger than this.
+/// Differences of more than this many standard errors are shown only as larger.
 const MANY: f64 = 100.0;
 
 /// The complete report on the study.
@@ -223,8 +223,8 @@ mod tests {
             "0.000000055",
             "Gyros, six-angle form (Eq. 8): not reproducible by a correct program, which gives zero",
             "a slip reproduces the figures in the paper: E_zy of the wrong sign",
-            "Gyros, three-angle form (Eq. 10): not reproduced as stated, but under another reading: angles \
-             ±0.2°, 48 h. With angles ±0.2° all agree but position",
+            "Gyros, three-angle form (Eq. 10): not reproduced as stated, but under another reading: angles ±0.2°, 48 \
+             h. With angles ±0.2° all agree except position",
             "Accelerometers, six-angle form (Eq. 8): zero except for rounding",
             "Accelerometers, three-angle form (Eq. 10): reproduced as stated",
         ] {

@@ -16,8 +16,8 @@ pub fn short(verdict: &Verdict) -> &'static str {
     }
 }
 
-/// The last column of the table: the verdict where the reading is as stated, otherwise whether it gives
-/// the paper's figures.
+/// The last column of the table: the verdict if the reading is as stated, otherwise whether the reading gives the
+/// figures in the paper.
 pub fn of_row(column: &Column, row: &Row) -> String {
     match row.reading.kind {
         Kind::Stated => short(&column.verdict).to_owned(),
@@ -30,7 +30,7 @@ fn of_reading(row: &Row) -> String {
     match (agree.len(), apart.len()) {
         (_, 0) => "all agree".to_owned(),
         (0, _) => "none agrees".to_owned(),
-        (more, few) if few < more => format!("all agree but {}", apart.join(", ")),
+        (more, few) if few < more => format!("all agree except {}", apart.join(", ")),
         _ => format!("only {} agree", agree.join(", ")),
     }
 }

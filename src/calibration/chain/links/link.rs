@@ -1,4 +1,4 @@
-//! A transition, and what is observed after it.
+//! A transition, and the observations after it.
 
 use nalgebra::Matrix3;
 
@@ -6,7 +6,7 @@ use super::given::Given;
 use super::rows::Rows;
 use super::transition::Transition;
 
-/// A transition, and what is observed after it.
+/// A transition, and the observations after it.
 #[derive(Debug, Clone)]
 pub struct Link {
     /// Whether a stretch begins here.

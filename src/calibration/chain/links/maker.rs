@@ -19,10 +19,10 @@ use crate::calibration::{CalibrationError, Constant, Group, Problem, Script, Sou
 use crate::imu::{GaussMarkov, MotionNoise, Noise, PerSensor, Sensor};
 use crate::navigation::{Block, ErrorMatrix, ProcessNoise};
 
-/// 1σ of the slips of all moves together over that of a position.
+/// 1σ of the slips of all moves together, divided by that of a position.
 const SLIP: f64 = 0.1;
 
-/// Makes links one after the other.
+/// Makes one link after the other.
 pub struct Maker<'a, F> {
     problem: &'a Problem<'a>,
     filters: [Box<dyn PartFilter>; 2],
@@ -81,8 +81,8 @@ impl<'a, F: FnMut(Link) -> Result<(), CalibrationError>> Maker<'a, F> {
         Ok(())
     }
 
-    /// Begins a stretch: navigation errors, table position and Earth rate anew; in another recording also what lasts a
-    /// recording.
+    /// Begins a stretch: resets navigation errors, table position and Earth rate; in another recording, also the states
+    /// of the recording.
     fn begin(&mut self, script: &Script, number: usize) {
         let (problem, states) = (self.problem, self.dynamics.states);
         let stretch = &problem.stretches()[number];
@@ -122,7 +122,7 @@ impl<'a, F: FnMut(Link) -> Result<(), CalibrationError>> Maker<'a, F> {
         }
     }
 
-    /// Begins a recording: slips of the table, deviations of the biases, and what differs between recordings, anew.
+    /// Begins a recording: resets slips of the table, deviations of the biases, and differences between recordings.
     fn begin_recording(&mut self, script: &Script, recording: usize) {
         let (model, states) = (&self.problem.model, self.dynamics.states);
         let (stated, still) = (Effect::Stated, [0.0; 3]);
@@ -154,7 +154,7 @@ impl<'a, F: FnMut(Link) -> Result<(), CalibrationError>> Maker<'a, F> {
         self.pending.drive(effect, self.dwell, first, &root);
     }
 
-    /// Through a move.
+    /// Adds a move.
     fn advance(&mut self, block: &Block) {
         let n = self.dynamics.states.count;
         let mut by = DMatrix::identity(n, n);
@@ -178,8 +178,8 @@ impl<'a, F: FnMut(Link) -> Result<(), CalibrationError>> Maker<'a, F> {
         self.vary(block.duration, self.dwell);
     }
 
-    /// Lets the biases vary: first-order Gauss–Markov (Brown and Hwang, *Introduction to Random Signals*, 4th ed., §3.8).
-    /// `event`: the number of the dwell that it concerns or precedes.
+    /// Lets the biases vary: first-order Gauss–Markov (Brown and Hwang, *Introduction to Random Signals*, 4th ed.,
+    /// §3.8). `event` is the number of the dwell that the variation concerns or precedes.
     fn vary(&mut self, duration: f64, event: usize) {
         let n = self.dynamics.states.count;
         for sensor in Sensor::ALL {
@@ -195,7 +195,7 @@ impl<'a, F: FnMut(Link) -> Result<(), CalibrationError>> Maker<'a, F> {
         }
     }
 
-    /// Through a part of a dwell, which gives rows.
+    /// Adds a part of a dwell, with its rows.
     fn stand(
         &mut self,
         rest: &Rest,
@@ -246,8 +246,8 @@ impl<'a, F: FnMut(Link) -> Result<(), CalibrationError>> Maker<'a, F> {
         Ok(())
     }
 
-    /// Refers the states to where a part begins. Where the body came to rest at a new position, that of the table is anew,
-    /// and the position is observed.
+    /// Refers the states to the beginning of a part. If the body came to rest at a new position, the table position is
+    /// reset and the position is observed.
     fn begin_part(&mut self, rest: &Rest, stretch: &Stretch) -> Rows {
         let states = self.dynamics.states;
         let (n, model) = (states.count, &self.problem.model);
@@ -276,7 +276,7 @@ impl<'a, F: FnMut(Link) -> Result<(), CalibrationError>> Maker<'a, F> {
         let still = [0.0; 3];
         if let Some(turn) = states.turn() {
             self.pending.reset(turn..turn + 3, &still);
-            // The rotation counts from an attitude that lacks the remainder of its pulses.
+            // The rotation is counted from an attitude without the remainder of its pulses.
             let remainder = stretch.run.recording.imu.pulse.gyro / 12f64.sqrt();
             let root = DMatrix::from_diagonal_element(3, 3, remainder);
             let effect = Effect::Stated(BudgetSource::Pulses);
@@ -314,7 +314,7 @@ impl Problem<'_> {
     }
 }
 
-/// The sources of the noise of a move, with their densities.
+/// The noise sources of a move, with their densities.
 fn noises(
     noise: PerSensor<Noise>,
     motion: PerSensor<MotionNoise>,
@@ -348,7 +348,7 @@ fn noises(
     ]
 }
 
-/// The variation of biases; none is one of zero.
+/// The variation of biases, zero if there is none.
 fn variation(noise: &Noise) -> GaussMarkov {
     noise.gauss_markov.unwrap_or(GaussMarkov {
         sigma: 0.0,
@@ -363,7 +363,7 @@ fn wander(sensor: Sensor) -> Effect {
     })
 }
 
-/// A root of a covariance of the navigation errors, without columns that are only rounding.
+/// A square root of a covariance of the navigation errors, without columns that are only rounding errors.
 fn root(covariance: &ErrorMatrix) -> DMatrix<f64> {
     let rows = covariance
         .row_iter()

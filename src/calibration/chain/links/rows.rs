@@ -22,7 +22,7 @@ impl Rows {
         }
     }
 
-    /// A copy with this number of rows, all zero.
+    /// A set of this number of rows, all zero.
     pub fn of(self, count: usize) -> Self {
         Self {
             states: DMatrix::zeros(count, self.states.ncols()),
@@ -31,7 +31,7 @@ impl Rows {
         }
     }
 
-    /// These rows below others.
+    /// Appends these rows to the rows `above`.
     pub fn and(self, above: Self) -> Self {
         let (m, k) = (above.values.len(), self.values.len());
         let mut all = above.of_more(k);

@@ -6,11 +6,11 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::calibration::chain::effects::Effect;
 
-/// Independent disturbances of the states with σ = 1 each, before they are scaled by the size of their effect.
+/// Independent disturbances of the states, each with σ = 1 before scaling by the size of its effect.
 #[derive(Debug, Clone)]
 pub struct Drive {
     pub effect: Effect,
-    /// Number of the event among those of the effect: the move, position or dwell before which it happens.
+    /// Number of the event among those of its effect: that of its move, its position, or the dwell that follows it.
     pub event: usize,
     /// Change of the states per disturbance, one column each.
     pub by: DMatrix<f64>,
@@ -23,7 +23,7 @@ pub struct Transition {
     pub constants: DMatrix<f64>,
     pub offset: DVector<f64>,
     pub drives: Vec<Drive>,
-    /// Covariance of the noise at rest in the part before.
+    /// Covariance of the noise at rest in the preceding part.
     pub covariance: DMatrix<f64>,
 }
 

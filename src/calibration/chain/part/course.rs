@@ -1,8 +1,8 @@
 //! Covariances and gains along the steps and observations of a part.
 //!
 //! They depend on the sequence of steps and observations, not on what was observed (Gelb, *Applied Optimal Estimation*,
-//! §4.2), and at rest not on the attitude either, because gravity and Earth rate are constant in East-North-Up. So most
-//! parts repeat the sequence of the one before.
+//! §4.2), and at rest not on the attitude either, because gravity and Earth rate are constant in East-North-Up. Most
+//! parts therefore repeat the sequence of the preceding part.
 
 use nalgebra::Matrix3;
 
@@ -19,11 +19,11 @@ pub struct StepModel<const M: usize> {
     pub driven: Vec<(usize, usize, f64)>,
 }
 
-/// The filter state is kept after every this many events, and recomputed from there: a gain needs a sixth of its
-/// memory.
+/// The filter state is kept once per this many events, and recomputed in between: a gain needs a sixth of the memory of
+/// a state.
 const KEPT: usize = 32;
 
-/// The sequence of a part, kept as far as the next one repeats it.
+/// The sequence of a part, kept as far as the next part repeats it.
 pub struct Course<const M: usize, const G: usize> {
     pub models: Vec<StepModel<M>>,
     /// All events, with the gains of observations.
@@ -36,11 +36,11 @@ pub struct Course<const M: usize, const G: usize> {
 
 #[derive(Clone, Copy, PartialEq)]
 enum Event {
-    /// A step of this model.
+    /// A step with this model.
     Step(usize),
-    /// Three states from a first one on are observed, each with this variance.
+    /// Observation of three states from the given one on, each with this variance.
     Observed(usize, f64),
-    /// Three states from a first one on are wider by this variance.
+    /// Addition of this variance to three states from the given one on.
     Widened(usize, f64),
 }
 
@@ -48,7 +48,7 @@ enum Event {
 pub struct Gain<const M: usize, const G: usize> {
     /// Lower triangular root of its covariance.
     pub root: Matrix3<f64>,
-    /// Rows of `g`, whitened by it.
+    /// Rows of `g`, whitened by this root.
     pub rows: [[f64; G]; 3],
     /// Gain of the moving states from the whitened observation.
     pub of_errors: [[f64; M]; 3],
@@ -58,7 +58,7 @@ pub struct Gain<const M: usize, const G: usize> {
 /// Moving states `U g + m` for given `g`, and information on `g`.
 #[derive(Clone)]
 pub struct Known<const M: usize, const G: usize> {
-    /// U
+    /// Matrix U.
     pub of_given: [[f64; G]; M],
     /// Covariance of m.
     pub covariance: [[f64; M]; M],
@@ -77,7 +77,7 @@ impl<const M: usize> StepModel<M> {
 }
 
 impl<const M: usize, const G: usize> Course<M, G> {
-    /// Components of `g`, each with a moving state that begins with it.
+    /// Components of `g`, each with the moving state whose initial value it is.
     pub fn new(begins: impl Iterator<Item = (usize, usize)>) -> Self {
         let mut known = Known {
             of_given: [[0.0; G]; M],
@@ -106,7 +106,7 @@ impl<const M: usize, const G: usize> Course<M, G> {
         self.models = models;
     }
 
-    /// Makes a step after this number of events.
+    /// Adds a step after this number of events.
     pub fn step(&mut self, from: usize, model: usize) {
         let event = Event::Step(model);
         if !self.is_next(from, event) {

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 pub enum Level {
     /// The values must not be used.
     Failed,
-    /// Part of what was asked was not determined.
+    /// Some of the requested parameters were not determined.
     Partial,
     /// The values may be used if the finding is taken into account.
     Care,
@@ -63,19 +63,19 @@ kinds! {
          If the text names a field, state it in run.toml. `turncal check` lists all faults of a log."
         "The record was repaired, or completed by assumptions, before the evaluation; U includes the effect."
     NotConverged = "W02" "not-converged" Failed:
-        "A parameter was still changing when the iterations ended, so neither the values nor σ can be used. The \
+        "A parameter was still changing when the iterations ended, so neither the values nor the σ can be used. The \
          usual causes are a wrong scale, unit, sample period or axis in run.toml, or a recording with almost no \
          motion. Run `turncal check`, which compares scale, unit and axes with gravity and the turns."
         "The evaluation did not converge; the results must not be used."
     Unexplained = "W03" "unexplained" Failed:
         "The residuals are too large for any noise figure, so the values are meaningless. The usual causes are labels \
          or table attitudes from a different recording, a wrong axis order, a wrong unit, or a mount that slipped. \
-         Look first at the interval with the largest residuals, which the finding names."
+         Look first at the interval with the largest residuals, given in the finding."
         "The residuals of the evaluation are unexplained; the results must not be used."
     NotObserved = "W04" "not-observed" Partial:
-        "The recording adds little information about these parameters: σ is still more than half of the prior, so \
-         turncal keeps their values and σ from [imu.prior]. Add positions that put each axis up and down, and a turn of 90° or more about each axis. \
-         `turncal check` predicts the σ of each parameter."
+        "The recording adds little information about these parameters: each σ is still more than half of the prior σ, \
+         so turncal keeps the values and σ of [imu.prior]. Add positions that put each axis up and down, and a turn of \
+         90° or more about each axis. `turncal check` predicts the σ of each parameter."
         "The record adds little to what was assumed about some parameters."
     CombinationsNotObserved = "W05" "combinations-not-observed" Care:
         "Each of these parameters is determined on its own, but a combination of them is not, because their errors \
@@ -89,9 +89,9 @@ kinds! {
          gyros with noise below 0.1 °/√h and dwells of one minute."
         "The gyroscopes do not show north; U of the gyroscope biases includes the unknown part of Earth rate."
     NoiseLearnt = "W07" "noise-learnt" Care:
-        "A noise figure in [imu.noise] is more than 1.5 times too small for this recording (false-alarm rate 1 in 1000). \
-         turncal used its own estimate for weights and σ. To state the estimate for the next recording, copy the lines \
-         of the finding into run.toml; to use the stated noise anyway, add --noise stated."
+        "A noise figure in [imu.noise] is more than 1.5 times too small for this recording (false-alarm rate 1 in \
+         1000). turncal used its own estimate for the weights and the σ. To state the estimate for the next recording, \
+         copy the lines of the finding into run.toml; to use the stated noise anyway, add --noise stated."
         "The noise of the instrument was estimated from the record, because it exceeds the stated noise."
     ScatterAtRest = "W08" "scatter-at-rest" Care:
         "You asked for the stated noise, but in dwells the samples scatter more or less than this noise implies. The \
@@ -111,7 +111,7 @@ kinds! {
         "The results apply together with the error terms listed in this certificate."
     Settling = "W15" "settling" Note:
         "After stops, the attitude differs from the reading of the table by an angle that fades within seconds. \
-         turncal estimated the usual size of this angle, and σ include it. Wait longer after each stop, or state \
+         turncal estimated the usual size of this angle, and the σ include it. Wait longer after each stop, or state \
          settling_sigma_arcsec in [turntable]."
         "The turntable settled for some seconds after its moves; U includes the effect."
     PositionWrong = "W16" "position-wrong" Care:
@@ -142,8 +142,8 @@ kinds! {
          by more than their σ. Rerun with --installation general."
         "The instrument has misalignments that the chosen model does not contain; U does not include them."
     Rounded = "W22" "rounded" Care:
-        "The log rounds values more coarsely than their noise, so averaging cannot recover the mean within a step. σ \
-         include this error. Log more digits or raw counts."
+        "The log rounds values more coarsely than their noise, so averaging cannot recover the mean within a step. The \
+         σ include this error. Log more digits or raw counts."
         "The output of the instrument is rounded to steps larger than its noise; U includes the effect."
     EvenTermsInseparable = "W24" "even-terms-inseparable" Care:
         "When an axis points up or down, the second-order term and the asymmetry of its accelerometer have the same \
@@ -156,12 +156,11 @@ kinds! {
          of the calibration."
     RecordingsDiffer = "W26" "recordings-differ" Care:
         "The recordings of this instrument differ by more than their σ and [day_to_day] allow. turncal estimated the \
-         difference and \
-         included it in σ. Usual causes are bias changes at switch-on, remounting, and a temperature sensor away \
-         from the inertial sensors."
+         difference and included it in the σ. Usual causes are bias changes at switch-on, remounting, and a \
+         temperature sensor away from the inertial sensors."
         "The instrument changed between the recordings of the calibration; U includes the difference."
     LabelsContradicted = "W27" "labels-contradicted" Care:
-        "The labels of some sections contradict gravity or the gyros. The finding names these sections and says \
+        "The labels of some sections contradict gravity or the gyros. The finding lists these sections and states \
          whether turncal used them. Correct the labels in the [segments] file."
         "The labels of some positions contradicted the data and were not used as stated."
     SectionsLost = "W28" "sections-lost" Care:
@@ -170,14 +169,14 @@ kinds! {
         "Some positions were not used, because data were missing."
     ResidualsLarge = "W29" "residuals-large" Care:
         "The closed form leaves residuals that stated noise and table errors do not explain. turncal widened all σ by \
-         √(χ²/ν), the Birge ratio. The finding names the interval with the largest residual: look there for a bump, a \
+         √(χ²/ν), the Birge ratio. The finding gives the interval with the largest residual: look there for a bump, a \
          wrong label or a wrong attitude. Otherwise check the noise figures, drifts of bias or scale factors, and the \
          level and north of the table."
         "The residuals exceed those expected; U was widened in proportion."
     StatementDoubted = "W30" "statement-doubted" Care:
         "run.toml contradicts the log: for example, gravity is far from normal gravity at the site, a column is \
          constant or named twice, or the table log has a different time or clock. Each of these can change the result \
-         by more than its σ. Correct the field or log that the finding names."
+         by more than its σ. Correct the field or log given in the finding."
         "Some statements about the record contradict its data."
     PriorContradicted = "W31" "prior-contradicted" Failed:
         "A scale factor differs from the stated one by more than 10 prior σ and more than 10 %, or by more than 41 \
@@ -195,8 +194,8 @@ kinds! {
         "The instrument slipped on the turntable; the misalignments apply to the mounting before the slip."
     TermNotShown = "W34" "term-not-shown" Note:
         "This recording cannot show an error term that instruments of this class may have, and K, E or D depend on the \
-         term. σ include its usual size. Add the moves that the finding names, or state that the instrument does not \
-         have the term: sigma = 0 in [imu.terms]. `--with none` leaves out all terms."
+         term. The σ include its usual size. Add the moves listed in the finding, or state that the instrument does \
+         not have the term: sigma = 0 in [imu.terms]. `--with none` leaves out all terms."
         "U includes the usual size of error terms that the record does not show."
 }
 

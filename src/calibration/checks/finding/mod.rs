@@ -11,7 +11,7 @@ use serde_json::Value;
 use crate::imu::Sensor;
 use kind::{Kind, Level};
 
-/// Growth of σ from which a user would decide otherwise.
+/// Growth of σ that would change the decision of a user.
 const MATTERS: f64 = 1.5;
 
 /// A finding of a check: the problem, its meaning for the result and the remedy, with figures.
@@ -56,7 +56,7 @@ impl Finding {
         Self::new(Kind::StatementDoubted, doubt, figures)
     }
 
-    /// The finding as a note if σ grew by less than half, because σ include the cause.
+    /// The finding, reduced to a note if σ grew by less than half, because the σ include the cause.
     pub fn of_growth(self, growth: f64) -> Self {
         if growth < MATTERS {
             self.at(Level::Note)
@@ -84,7 +84,7 @@ impl Finding {
         self.kind == kind.name()
     }
 
-    /// The problem, in the first sentence of the text, and the remedy, in the last.
+    /// The problem (first sentence of the text) and the remedy (last sentence).
     pub fn headline(&self) -> (&str, Option<&str>) {
         match self.text.split_once(". ") {
             Some((first, rest)) => (first, rest.rsplit(". ").next()),
@@ -107,7 +107,7 @@ pub fn triad_name(sensor: Sensor) -> &'static str {
     }
 }
 
-/// The widening of σ in words: in percent below a factor of two, else as a factor.
+/// The widening of σ in words: in percent below a factor of two, otherwise as a factor.
 pub fn widened_by(growth: f64) -> String {
     if growth < 2.0 {
         format!("by up to {:.0} %", 100.0 * (growth - 1.0))

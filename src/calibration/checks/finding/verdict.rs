@@ -10,11 +10,11 @@ use super::kind::Level;
 /// Whether a calibration may be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Word {
-    /// The calibration converged, σ agree with the residuals, and all requested parameters are determined.
+    /// The calibration converged, the σ agree with the residuals, and all requested parameters are determined.
     #[serde(rename = "good")]
     Good,
-    /// The values are usable, but the reasons name a cause that widened σ or a statement that the recording
-    /// contradicts.
+    /// The values are usable, but a cause increased the σ, or the recording contradicts a statement; the reasons give
+    /// details.
     #[serde(rename = "use with care")]
     UseWithCare,
     /// Some of the requested parameters are not determined; the others are usable.

@@ -17,16 +17,15 @@ use crate::calibration::{Estimate, OBSERVED_BELOW, PARAMETERS, ParameterVector, 
 use crate::imu::InstallationForm;
 pub use not_observed::{not_observed, not_observed_by_path, temperature_not_seen};
 
-/// Directions whose remaining σ agree to this part of it form one space, for which the simplest basis may
-/// be chosen.
+/// Directions whose remaining σ agree within this fraction form one space; its simplest basis may be chosen.
 const ALIKE: f64 = 0.01;
-/// A component is named if its square is at least this part of the whole.
+/// A component is listed if its square is at least this fraction of the whole.
 const NAMED: f64 = 0.1;
 /// From this correlation on, an unobserved direction is reported as tied to the attitude.
 const TIED: f64 = 0.7;
 /// Rotations of a pair of directions below this count as converged, rad.
 const SETTLED: f64 = 1e-9;
-/// Most rotations of each pair; they converge within ten.
+/// Maximum number of rotations of each pair; they converge within ten.
 const SWEEPS: usize = 100;
 
 /// Covariance of each parameter error δθ with each component of the initial attitude error φ₀ in
@@ -104,7 +103,7 @@ impl Observability {
             .take_while(|direction| direction.remaining > OBSERVED_BELOW)
     }
 
-    /// Descriptions of unobserved combinations of parameters, none of which is among these.
+    /// Descriptions of unobserved combinations of parameters, without these parameters.
     pub(in crate::calibration) fn combinations(&self, hidden: &[String]) -> Vec<String> {
         self.unobserved()
             .filter(|direction| !direction.parts.keys().any(|name| hidden.contains(name)))
@@ -156,7 +155,7 @@ fn direction(
     let named = major.filter_map(|&n| Some((parameter_name(form, estimated[n])?, sign * v[n])));
     let parts: Vec<(String, f64)> = named.collect();
     let rest = 1.0 - parts.iter().map(|part| part.1.powi(2)).sum::<f64>();
-    // φ₀ is the rotation from the computed to the true attitude; heading turns the other way.
+    // φ₀ is the rotation from the computed to the true attitude; heading has the opposite sense.
     let tied = [
         ("tilt about East", 1.0),
         ("tilt about North", 1.0),

@@ -83,7 +83,7 @@ pub fn not_observed(by: &str, parameters: Vec<String>) -> Option<Finding> {
     (!parameters.is_empty()).then(|| Finding::new(Kind::NotObserved, text, figures))
 }
 
-/// The finding on constants of the table and of error terms that were asked for, if any.
+/// The finding on requested constants of the table and of error terms, if any.
 fn constants_not_observed(constants: Vec<String>) -> Option<Finding> {
     let text = format!(
         "This path does not determine these constants of the table or of error terms, which keep their stated \
@@ -122,7 +122,7 @@ fn combinations(combinations: Vec<String>) -> Option<Finding> {
 /// The finding on the heading, with its 1σ after the run, rad.
 fn heading(sigma_rad: f64) -> Finding {
     let sigma_deg = sigma_rad / DEGREE;
-    // A larger σ is that of a uniform angle, which says nothing.
+    // A larger σ is that of a uniformly distributed angle and gives no information.
     let known = if sigma_deg < 90.0 {
         format!(" (σ = {sigma_deg:.1}°)")
     } else {

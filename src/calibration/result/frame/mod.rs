@@ -3,8 +3,8 @@
 //!
 //! The same instrument has a different `C` in every body frame: `K C u = K (C Rᵀ)(R u)`. In the accelerometer frame
 //! (`x` along accelerometer x, `y` in the plane of accelerometers x and y) `R` is the orthogonal factor of the LQ
-//! decomposition of the accelerometers' `K C` (Golub, Van Loan, *Matrix Computations*, 4th ed., §5.2). Row norms of `K
-//! C`, so the general form's scale factors, and biases are the same in every frame.
+//! decomposition of the accelerometers' `K C` (Golub, Van Loan, *Matrix Computations*, 4th ed., §5.2). Biases and the
+//! row norms of `K C` (and thus the scale factors of the general form) are the same in every frame.
 
 use std::collections::BTreeMap;
 
@@ -31,7 +31,7 @@ pub struct Named<'a> {
 /// assumed to have those of the other.
 ///
 /// # Errors
-/// [`ComparisonError`] if their units differ or one of them cannot be converted.
+/// [`ComparisonError`] if the units differ or a record cannot be converted.
 pub fn in_common_form(
     first: Named,
     second: Named,
@@ -69,7 +69,7 @@ pub struct Canonical {
     pub covariance: Option<ParameterMatrix>,
     /// Whether the record gives correlations; if not, its errors are treated as independent.
     pub correlated: bool,
-    /// Auxiliary constants by name, which to first order do not depend on the body frame.
+    /// Auxiliary constants by name; to first order, they do not depend on the body frame.
     pub constants: BTreeMap<String, TermRecord>,
 }
 
@@ -151,8 +151,8 @@ impl Estimate {
     }
 }
 
-/// Triads in any body axes, converted to the axes of a body frame; unchanged for the table frame, which they do not
-/// determine.
+/// Triads in any body axes, converted to the axes of a body frame; unchanged for the table frame, because they do not
+/// determine it.
 pub fn in_body_frame(triads: &PerSensor<Triad>, body_frame: BodyFrame) -> PerSensor<Triad> {
     if body_frame == BodyFrame::Table {
         return *triads;
@@ -161,7 +161,7 @@ pub fn in_body_frame(triads: &PerSensor<Triad>, body_frame: BodyFrame) -> PerSen
     PerSensor::from_fn(|sensor| {
         let triad = triads.get(sensor);
         let mut a = triad.sensitivity() * rotation.transpose();
-        // What the accelerometer frame fixes at zero is zero, without rounding.
+        // Entries that the accelerometer frame fixes at zero are exactly zero.
         if sensor == Sensor::Accel {
             a.fill_upper_triangle(0.0, 1);
         }
@@ -181,8 +181,8 @@ pub fn free_parameters(body_frame: BodyFrame) -> Vec<usize> {
     free
 }
 
-/// The nominal scales by which a record's own scale factors in the general form are one: the norms
-/// of the rows of `K C`, with the sign of the scale factor.
+/// The nominal scales for which the scale factors of the record in the general form are one: the norms of the rows of
+/// `K C`, with the sign of the scale factor.
 pub fn own_nominal(record: &Calibration) -> PerSensor<Nominal> {
     PerSensor::from_fn(|sensor| {
         let triad = record.triad(sensor);
@@ -192,8 +192,8 @@ pub fn own_nominal(record: &Calibration) -> PerSensor<Nominal> {
     })
 }
 
-/// `R` from the given body frame to the accelerometer frame: `a Rᵀ` is lower triangular. Its rows are
-/// those of `a`, made orthonormal one after the other; NaN where `a` does not span the space.
+/// `R` from the given body frame to the accelerometer frame: `a Rᵀ` is lower triangular. Its rows are those of `a`,
+/// made orthonormal one after the other; NaN if `a` does not span the space.
 pub fn accelerometer_frame(a: &Matrix3<f64>) -> Matrix3<f64> {
     let rows: [Vector3<f64>; 2] = [0, 1].map(|i| a.row(i).transpose());
     let x = rows[0].normalize();

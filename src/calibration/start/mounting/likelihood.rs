@@ -11,8 +11,8 @@ use crate::calibration::parameters::{ParameterVector, parameter};
 use crate::calibration::start::equations::{Equations, OfTriad, Rows, of, of_sensitivity};
 use crate::imu::{AxisOrder, PerSensor, Sensor};
 
-/// Factors by which stated noise and prior may be too small, all equally likely, so that neither an inaccurate prior
-/// nor non-white motion favours another axis order.
+/// Factors by which stated noise and prior may be too small. All are equally likely, so that neither an inaccurate
+/// prior nor non-white motion favours another axis order.
 #[derive(Debug, Clone, Copy)]
 pub struct TooSmall {
     pub noise: &'static [f64],
@@ -42,7 +42,7 @@ pub struct Errors {
     pub too_small: TooSmall,
 }
 
-/// Logarithm of the likelihood of each order, and of no order.
+/// Log-likelihood of each order, and of no order.
 #[derive(Debug, Clone)]
 pub struct Likelihoods {
     pub of: Vec<f64>,
@@ -74,7 +74,7 @@ impl Likelihoods {
     }
 }
 
-/// Likelihoods with a table, which gives gravity and turns: each triad is tested separately.
+/// Likelihoods with a table. The table gives gravity and turns, so each triad is tested separately.
 pub fn by_table(
     motion: &Motion,
     errors: &Errors,
@@ -96,11 +96,11 @@ pub fn by_table(
     })
 }
 
-/// Likelihoods with labels, which state the upward axis and the turn axis: each triad is tested separately.
+/// Likelihoods with labels. The labels state the upward axis and the turn axis, so each triad is tested separately.
 pub fn by_labels(motion: &Motion, errors: &Errors, orders: &[AxisOrder]) -> PerSensor<Likelihoods> {
     PerSensor::from_fn(|sensor| {
         Likelihoods::new(errors, orders, |equations, order| {
-            // Angles are by gyros whose zero is that at rest.
+            // Angles are from gyros whose zero is the output at rest.
             let zero = f64::from(u8::from(sensor == Sensor::Accel));
             for (_, sensed) in motion.labels.iter().filter(|(of, _)| *of == sensor) {
                 add_sensed(equations, sensor, sensed, order, zero);
@@ -161,7 +161,7 @@ fn add_turn(equations: &mut Equations, turn: &Move, order: &AxisOrder) {
         return;
     };
     let turned = &turn.turns[usize::from(!order.is_rotation())];
-    // An improper order and its opposite turn a rotation alike.
+    // An improper order and its opposite have the same effect on a rotation.
     let known = order.matrix().transpose() * known * order.matrix();
     let off = log(&(turned.rotation * known.transpose()));
     let partials = of(Sensor::Gyro, &turned.partials);
@@ -181,7 +181,7 @@ fn add_carried(
     };
     let matrix = order.matrix();
     let carried = turned.rotation * (matrix * up_after);
-    // Of the error of a force what is across it turns its direction.
+    // Only the components of a force error across the force change its direction.
     let across = |up: &Vector3<f64>| {
         (Matrix3::identity() - up * up.transpose()) * of_sensitivity(up.push(1.0))
     };
@@ -215,14 +215,14 @@ fn add_earth_rate(
     equations.add(&Rows::new(partials, residual, variance));
 }
 
-/// Logarithm of the likelihood of the residuals, with the unknowns integrated out.
+/// Log-likelihood of the residuals, with the unknowns integrated out.
 fn log_likelihood(equations: &Equations, too_small: TooSmall) -> f64 {
     if equations.rows.is_empty() {
         return 0.0;
     }
     let (design, residual) = equations.in_sigmas();
     let (information, vector) = (design.tr_mul(&design), design.tr_mul(&residual));
-    // Samples of absurd size overflow, and tell nothing.
+    // Samples of absurd size overflow and give no information.
     if !information.iter().chain(&vector).all(|v| v.is_finite()) {
         return f64::NEG_INFINITY;
     }
@@ -257,11 +257,11 @@ fn explained((diagonal, off_diagonal): (&[f64], &[f64]), v: &[f64], r: f64) -> (
     for (k, (along_diagonal, v)) in diagonal.iter().zip(v).enumerate() {
         let off = if k > 0 { r * off_diagonal[k - 1] } else { 0.0 };
         part = v - off / pivot * part;
-        // No pivot is below 1, whatever rounding says.
+        // No pivot is below 1, except by rounding.
         pivot = f64::max(1.0 + r * along_diagonal - off * off / pivot, 1.0);
         sum += part * part / pivot;
         product *= pivot;
-        // A logarithm for each few factors, before they overflow.
+        // One logarithm per few factors, before they overflow.
         if k % 4 == 3 || k + 1 == diagonal.len() {
             log_determinant += product.ln();
             product = 1.0;

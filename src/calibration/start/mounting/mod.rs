@@ -2,9 +2,9 @@
 //! before the first pass and reports the corrected line for `run.toml`.
 //!
 //! Each of the 48 signed permutations of each triad is a hypothesis, weighted by its marginal likelihood: the prior
-//! errors of the triads are integrated out, as are factors by which prior and noise may be stated too small. The
-//! decision thus depends only on likelihood ratios, not on the size of residuals. A likelihood ratio of X in favour of
-//! a wrong hypothesis occurs at most once in X recordings.
+//! errors of the triads are integrated out, and so are factors by which the stated prior and noise may be too small.
+//! The decision thus depends only on likelihood ratios, not on the size of residuals. A likelihood ratio of X in favour
+//! of a wrong hypothesis occurs at most once in X recordings.
 
 mod contradiction;
 mod likelihood;
@@ -33,7 +33,7 @@ const TOLD_APART: f64 = 1e3;
 const OTHERS: usize = 2;
 
 impl Mounting {
-    /// The most likely one, if it differs from the stated one.
+    /// The most likely axis order, if it differs from the stated one.
     fn likeliest(problem: &Problem, run: &Run, motion: &Motion) -> Option<Self> {
         let hypotheses = Hypotheses::of(problem, run, motion);
         let (likely, log_ratio) = hypotheses.likely()?;
@@ -136,8 +136,8 @@ impl Hypotheses {
         Self { each, together }
     }
 
-    /// The axis orders hardly less likely than the best, the simplest first, if the stated one is too unlikely; and the
-    /// logarithm of that ratio.
+    /// The axis orders that are hardly less likely than the best, the simplest first, if the stated order is too
+    /// unlikely; and the log of that ratio.
     fn likely(&self) -> Option<(Vec<PerSensor<AxisOrder>>, f64)> {
         let pairs = AxisOrder::all()
             .flat_map(|accel| AxisOrder::all().map(move |gyro| PerSensor { gyro, accel }));
@@ -150,14 +150,13 @@ impl Hypotheses {
             })
             .collect();
         let (best, largest) = pairs.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
-        // The first pair is the one that is stated.
+        // The first pair is the stated one.
         let log_ratio = largest - pairs.first()?.1;
         let limit = (pairs.len() as f64 / FALSE_ALARMS).ln();
         if log_ratio.is_nan() || log_ratio <= limit {
             return None;
         }
-        // Where no mounting explains the motion, or what it is known from does not agree, something else
-        // is wrong.
+        // If no axis order explains the motion, or if the sources of known motion disagree, something else is wrong.
         let explains = |part: &Part| part.of >= part.none && part.largest - part.of < limit;
         if !self.parts(best).iter().all(explains) {
             return None;
@@ -192,7 +191,7 @@ impl Hypotheses {
     }
 }
 
-/// Logarithms of the likelihoods for one source of known motion.
+/// Log-likelihoods for one source of known motion.
 struct Part {
     of: f64,
     /// Likelihood of no explanation.
@@ -215,8 +214,8 @@ impl Part {
     }
 }
 
-/// The logarithm of the likelihood of each gyro axis order, and of no explanation, given the motion of a run with the
-/// dwells of a problem; the accelerometer axes are as stated.
+/// The log-likelihood of each gyro axis order, and of no explanation, given the motion of a run with the dwells of a
+/// problem; the accelerometer axes are as stated.
 pub fn orders_of_gyros(problem: &Problem, run: &Run) -> Vec<(AxisOrder, f64, f64)> {
     let hypotheses = Hypotheses::of(problem, run, &Motion::of(problem, 0, run));
     let weighed = |gyro| {

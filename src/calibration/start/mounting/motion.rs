@@ -18,7 +18,8 @@ use crate::run::{Dwell, Run};
 /// Residual error of summed rotations due to coning and motion within a sample, rad. It represents all errors of a
 /// noise-free recording.
 const FLOOR: f64 = 1e-4;
-/// A part of a move with a larger rotation is cut at the next table reading, rad, because half a turn has no direction.
+/// A part of a move with a larger rotation, rad, is cut at the next table reading, because the direction of half a turn
+/// is ambiguous.
 const LEG: f64 = 1.0;
 
 /// A vector as measured in column axes, and as known in body axes.
@@ -212,11 +213,11 @@ impl Legs<'_> {
         increments.map(|increment| increment - self.zero)
     }
 
-    /// `fastest`: from the table, rad per sample.
+    /// `fastest` is the largest rate of the table, rad per sample.
     fn leg(&self, samples: Range<usize>, known: Option<Matrix3<f64>>, fastest: f64) -> Move {
         let turned = |sign: f64| {
             let mut rotation = Matrix3::identity();
-            // By the component of the output.
+            // Weighted by the component of the output.
             let mut turns = [Matrix3::zeros(); 3];
             for increment in self.increments(samples.clone()) {
                 let angle = increment * sign;

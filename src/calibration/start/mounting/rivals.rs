@@ -61,7 +61,8 @@ impl Contradiction {
         if mounting.is_none() && (stated.is_explained || !misses) {
             return None;
         }
-        // Three quarters of a turn equal a quarter the other way: of equally likely hypotheses, the axes are named.
+        // Three quarters of a turn equal a quarter the other way: if hypotheses are equally likely, the axes are
+        // reported.
         let least = mounting.as_ref().map_or(beyond_chance, |mounting| {
             let axes = (TooSmall::CARELESS, mounting.orders);
             sum(&parts(problem, run, &measured, axes)) + TOLD_APART.ln()
@@ -108,7 +109,7 @@ pub fn is_beyond_tolerance(factor: f64, sigma: f64) -> bool {
     factor.abs().ln().abs() > (CARELESS * sigma).clamp(WIDEST_TOLERANCE, NEXT_RANGE.ln())
 }
 
-/// The accelerometers whose specific force at rest differs from gravity, with the ratio.
+/// The accelerometers whose specific force at rest does not match gravity, with the ratio.
 ///
 /// If the attitudes separate the axes, `Σ (f_i / s_i)² = 1` over all dwells gives the sensitivity of each; otherwise
 /// the magnitude gives that of the triad.
@@ -125,7 +126,7 @@ fn by_magnitude(run: &Run, motion: &Motion) -> Option<(Axes, f64)> {
         (Matrix3::zeros(), Vector3::zeros()),
         |(normal, right), of| (normal + of * of.transpose(), right + of),
     );
-    // Of dwells with each axis up and down each is as large as the others.
+    // With each axis up and down in some dwell, all eigenvalues are of similar size.
     let eigen = normal.symmetric_eigenvalues();
     let of_axes = (eigen.min() > eigen.max() / WIDEST)
         .then(|| normal.cholesky())
@@ -162,8 +163,7 @@ fn told_apart(tried: &[(f64, f64)]) -> Vec<f64> {
     chosen
 }
 
-/// The tested gyro sensitivities with the logarithm of the likelihood of each, the most likely first, accurate to a
-/// thousandth.
+/// The tested gyro sensitivities with the log-likelihood of each, the most likely first, accurate to a thousandth.
 fn factors(log_likelihood: impl Fn(f64) -> f64) -> Vec<(f64, f64)> {
     let reach = (WIDEST.ln() / STEP.ln()) as i32;
     let weighed = |factor| (factor, log_likelihood(factor));
@@ -214,7 +214,7 @@ fn exchanged(run: &Run) -> Run {
 
 /// A statement or an alternative, weighted by the likelihood of the resulting motion.
 struct Weighed {
-    /// Logarithm of its likelihood with noise and prior close to the stated ones.
+    /// Log-likelihood with noise and prior close to the stated ones.
     log_likelihood: f64,
     /// Whether the hypothesis is more likely than no explanation, and hardly more likely with any other noise and
     /// prior.
@@ -254,7 +254,7 @@ fn parts(
     motion: &Motion,
     (too_small, orders): (TooSmall, PerSensor<AxisOrder>),
 ) -> Vec<Part> {
-    // A rate at rest is as large as the factor that is tried makes it: it does not tell factors apart.
+    // The rate at rest scales with the trial factor, so it does not distinguish between factors.
     let mut motion = motion.clone();
     motion.upward = None;
     // The first order is as stated.

@@ -7,7 +7,7 @@ use crate::number::three_digits;
 use crate::run::Run;
 use crate::units::{DEGREE, STANDARD_GRAVITY};
 
-/// Halfway to the sensitivity of the next range, which differs by a factor of two.
+/// Halfway to the sensitivity of the next range (which differs by a factor of two).
 pub const NEXT_RANGE: f64 = std::f64::consts::SQRT_2;
 
 /// A triad, or one axis of it, with a sensitivity different from the stated one.
@@ -28,9 +28,9 @@ pub struct Sensitivity {
 /// All axes of a triad, or one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Axes {
-    /// All three.
+    /// All three axes.
     All,
-    /// The one with this number.
+    /// The axis with this number.
     One(usize),
 }
 

@@ -15,7 +15,7 @@ use crate::units::DEGREE;
 pub struct Mounting {
     /// The correct order of the outputs of each triad, along right-front-up.
     pub orders: PerSensor<AxisOrder>,
-    /// Source of the evidence, in a few words.
+    /// Short description of the source of the evidence.
     pub known_from: &'static str,
     /// Natural logarithm of the likelihood ratio in favour of this order.
     pub log_ratio: f64,
@@ -85,7 +85,7 @@ fn said(orders: &PerSensor<AxisOrder>) -> String {
     parts.join("; ")
 }
 
-/// Such as `90° about z`.
+/// Angle and axis of a rotation, such as `90° about z`.
 fn turn(rotation: &Matrix3<f64>) -> String {
     let turn = log(rotation);
     let angle = turn.norm();
@@ -93,7 +93,7 @@ fn turn(rotation: &Matrix3<f64>) -> String {
     let largest = axis.iamax();
     let positive = axis * axis[largest].signum();
     if positive[largest] > 0.999 {
-        // Half a turn has no sense.
+        // Half a turn has no sign.
         let signed = if angle > 179.0 * DEGREE {
             angle
         } else {
@@ -105,7 +105,7 @@ fn turn(rotation: &Matrix3<f64>) -> String {
     format!("{:.0}° about ({x:.2}, {y:.2}, {z:.2})", angle / DEGREE)
 }
 
-/// Such as `gyro x is read as −y, gyro y is read as x (rotated by 90° about z)`.
+/// A description such as `gyro x is read as −y, gyro y is read as x (rotated by 90° about z)`.
 fn of_triad(sensor: Sensor, order: &AxisOrder) -> String {
     let how = if order.is_rotation() {
         format!("rotated by {}", turn(&order.matrix()))
@@ -130,7 +130,7 @@ fn axes(sensor: Sensor, order: &AxisOrder) -> String {
 
 /// The line for `run.toml`, or the orders by name for a simulated run.
 pub fn line(run: &Run, orders: &PerSensor<AxisOrder>) -> String {
-    // A nominal scale below zero turns what comes in already.
+    // A negative nominal scale already reverses the input.
     let as_columns = PerSensor::from_fn(|sensor| {
         let nominal = run.instrument.nominal.get(sensor).0;
         let mut order = *orders.get(sensor);

@@ -8,15 +8,15 @@ use crate::recording::faults::rows::consecutive;
 
 /// Maximum number of samples used on either side of a hole.
 pub const MOST: usize = 64;
-/// Most intact stretches on either side on which a fill is tested.
+/// Maximum number of intact stretches on either side for testing a fill.
 const TRIALS: usize = 16;
-/// Fewest intact stretches on both sides together on which a fill is tested.
+/// Minimum number of intact stretches on both sides together for testing a fill.
 const FEWEST_TRIALS: usize = 8;
-/// If the change across the hole exceeds this many times the largest across intact stretches, they do not represent
-/// it.
+/// If the change across the hole exceeds this many times the largest change across intact stretches, those stretches do
+/// not represent the hole.
 const UNTRIED: f64 = 2.0;
 
-/// A polynomial through neighbours by least squares.
+/// A least-squares polynomial through neighbours.
 pub struct Fill {
     hole: Range<usize>,
     /// Runs of consecutive neighbours; those before the hole come first.
@@ -63,7 +63,7 @@ impl Fill {
         let used = || fill.runs.iter().flat_map(Range::clone);
         let powers = used().map(|k| fill.powers(k));
         let mut normal: Matrix4<f64> = powers.map(|x| x * x.transpose()).sum();
-        // Powers beyond the degree stay out.
+        // Powers beyond the degree are omitted.
         for k in degree + 1..4 {
             normal[(k, k)] = 1.0;
         }
@@ -142,7 +142,7 @@ impl Fill {
             Some(squares / of_half)
         };
         let halves = [mean_square(0, most)?, mean_square(1, f64::INFINITY)?];
-        // A larger change than any tried may have come at any moment.
+        // A change larger than any tested may have happened at any moment.
         let sudden = if is_tried {
             0.0
         } else {
@@ -186,7 +186,7 @@ fn later(run: &Range<usize>, shift: isize) -> Range<usize> {
     start..start + run.len()
 }
 
-/// Number of sums that are formed in parallel, so that none waits for another.
+/// Number of sums formed in parallel, so that no sum waits for another.
 const BESIDE: usize = 4;
 
 fn product(weights: &[f64], values: &[f64]) -> f64 {

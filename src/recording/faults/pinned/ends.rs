@@ -25,7 +25,7 @@ pub fn saturated(
     let noise = pinned.into_iter().flatten().reduce(f64::max);
     let noise = noise.filter(|noise| *noise > 0.0);
     if let Some(full) = full_scale {
-        // Registers go a step further down than up.
+        // Registers extend one step further down than up.
         let (zero, step) = (own.zero(), own.facts.step.unwrap_or(0.0));
         return own.at_end(noise, |value| {
             (value - zero).abs() >= (full - step) * (1.0 - 1e-9)
@@ -35,7 +35,7 @@ pub fn saturated(
         let end = extremes[k];
         pinned[k].is_some() || own.is_register_end(end) || own.is_reached_by_spikes(end, spikes)
     });
-    // The range is symmetric except for a step.
+    // The range is symmetric except for one step.
     let [smallest, largest] = extremes;
     let slack = 1.5 * own.facts.step.unwrap_or(0.0) + 1e-9 * largest.abs();
     let mirrored = (smallest + largest).abs() <= slack;
@@ -48,8 +48,8 @@ pub fn saturated(
 /// Whether an axis repeats this value more often in a row than its noise or its motion allows. Returns the σ of the
 /// noise that reaches the value; zero for a motion that is clipped there.
 ///
-/// An axis may be quieter than usual, or than its neighbouring rows, at rest or in the steady turn of a table. Then
-/// the other axes of the triad are as quiet, and noise and motion are scaled down by their example.
+/// An axis may be quieter than usual, or than its neighbouring rows, at rest or in the steady turn of a table. Then the
+/// other axes of the triad are also quiet, and noise and motion are scaled down accordingly.
 fn pinned(triad: [&Axis; 3], axis: usize, end: f64, limit: Limit) -> Option<f64> {
     let own = triad[axis];
     let of_run = |run: &Range<usize>| {
@@ -58,7 +58,7 @@ fn pinned(triad: [&Axis; 3], axis: usize, end: f64, limit: Limit) -> Option<f64>
         let quieter = |usual: &dyn Fn(&Axis) -> f64| {
             let others = (0..3).filter(|&other| other != axis);
             let quieter = others.map(|other| match usual(triad[other]) {
-                // It tells nothing.
+                // This axis gives no information.
                 0.0 => 0.0,
                 usual => (triad[other].unrest(rows.clone()) / usual).min(1.0),
             });
@@ -112,7 +112,7 @@ impl Axis<'_> {
                 self.median()
                     .is_some_and(|median| middle.contains(&(median / step)))
             };
-            // A grid that is known from rounded digits is known to its last step.
+            // A grid that follows from rounded digits is known to its last step.
             let is = |register: f64| (end / step - register).abs() < 0.5;
             [half - 1.0, 1.0 - half, -half].into_iter().any(is)
                 || ([0.0, 2.0 * half - 1.0].into_iter().any(is) && offset())
@@ -157,11 +157,11 @@ impl Axis<'_> {
 
 /// Noise moves no row farther than this from the true value, σ.
 const FAR: f64 = 5.0;
-/// If noise reaches an end in fewer than one row in this many, clipping biases the mean by less than a hundredth of
-/// its σ.
+/// If noise reaches an end in less than one row in this many, clipping biases the mean by less than a hundredth of its
+/// σ.
 const SELDOM: usize = 64;
-/// Most rows between two rows at an end. With fewer, chance would separate rows that are SELDOM apart on average, and
-/// the remaining noise would be selected by its sign.
+/// Maximum number of rows between two rows at an end. With a smaller number, rows that are SELDOM apart on average
+/// would be separated by chance, and the remaining noise would be selected by its sign.
 const APART: usize = 8 * SELDOM;
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! The list that distinguishes files that turncal wrote into a directory from files that a user added.
+//! The list of the files that turncal wrote into a directory, to distinguish them from files added by a user.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsString;
@@ -24,7 +24,7 @@ pub fn of_all(directory: &Path) -> io::Result<String> {
     Ok(of_names(names.iter().map(String::as_str)))
 }
 
-/// Text of the list of a growing directory that has these entries. Entries that end in `/` have their own list.
+/// Text of the list of a growing directory with these entries. Entries that end in `/` have their own list.
 pub fn of_names<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
     let lines = std::iter::once(FIRST_LINE).chain(names);
     lines.flat_map(|line| [line, "\n"]).collect()
@@ -50,7 +50,7 @@ pub fn listed_files(directory: &Path) -> Vec<PathBuf> {
     files.filter(|file| file.is_file()).collect()
 }
 
-/// The first entry of a directory that its list does not name, relative to it.
+/// Relative path of the first entry of a directory that is not in its list.
 pub fn foreign(directory: &Path) -> io::Result<Option<PathBuf>> {
     let of_all = listed(directory).unwrap_or_default();
     let grows: Vec<&str> = of_all.iter().filter_map(|n| n.strip_suffix('/')).collect();

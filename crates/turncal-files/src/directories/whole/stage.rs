@@ -14,7 +14,7 @@ use turncal_input::FileError;
 const PREFIX: &str = ".turncal-";
 const NEW: &str = "new";
 const OLD: &str = "old";
-/// New output that is being removed.
+/// Name of new output that is being removed.
 const DEAD: &str = "dead";
 
 /// Announces every stage to the thread that ends the process on a signal; not set in a library.
@@ -22,14 +22,14 @@ static ANNOUNCED: OnceLock<Sender<Beside>> = OnceLock::new();
 /// Whether that thread is about to end the process.
 static ENDING: AtomicBool = AtomicBool::new(false);
 
-/// Error: an output must not replace the file or directory at `target`.
+/// Error if an output must not replace the file or directory at `target`.
 pub fn taken(target: &Path) -> FileError {
     let found = "an existing file or directory of this name";
     let advice = "Choose another name, or add --force to replace it.";
     FileError::of(target, found, "an unused name", advice)
 }
 
-/// Error: the system does not allow writing at `target`.
+/// Error if the system does not allow writing at `target`.
 pub fn unwritable(target: &Path, doing: &str, error: &io::Error) -> FileError {
     let advice = "Choose a directory that can be written.";
     FileError::io(target, doing, error, advice)
@@ -39,7 +39,7 @@ pub fn unwritable(target: &Path, doing: &str, error: &io::Error) -> FileError {
 pub struct Unfinished(Receiver<Beside>);
 
 impl Unfinished {
-    /// Collects unfinished outputs from here on; `None` if another thread already does.
+    /// Collects unfinished outputs from here on; `None` if another thread already does so.
     pub fn of_this_process() -> Option<Self> {
         let (announced, all) = channel();
         ANNOUNCED.set(announced).ok().map(|()| Self(all))
@@ -50,7 +50,7 @@ impl Unfinished {
     pub fn abandon(self) {
         ENDING.store(true, Ordering::SeqCst);
         for beside in self.0.try_iter() {
-            // Another thread may be writing into it or exchanging old and new.
+            // Another thread may be writing into the output or exchanging the old and the new one.
             for _ in 0..100 {
                 if beside.remove().is_ok() {
                     break;
@@ -72,7 +72,7 @@ impl Beside {
     /// Announces the stage; does not return if the process is about to end.
     fn announce(&self) {
         if let Some(all) = ANNOUNCED.get() {
-            // Without that thread nobody receives it.
+            // Without that thread, nothing receives the announcement.
             let _ = all.send(self.clone());
         }
         if ENDING.load(Ordering::SeqCst) {
@@ -86,7 +86,7 @@ impl Beside {
     /// Removes the stage and the directories created for it, if empty.
     fn remove(&self) -> io::Result<()> {
         let removed = remove(&self.stage);
-        // The first that is not empty ends this; so does a target that is in place.
+        // Removal stops at the first directory that is not empty, for example because the target is in place.
         let _ = self.parents.iter().try_for_each(fs::remove_dir);
         removed
     }
@@ -153,7 +153,7 @@ impl Stage {
         if exists && !force {
             return Err(taken(&self.target));
         }
-        // The target is never missing where the system can exchange two names.
+        // If the system can exchange two names, the target is never missing.
         if exists && exchange(&self.new_path(), &self.target).is_ok() {
             return Ok(());
         }
@@ -191,7 +191,8 @@ fn begin(parent: &Path) -> io::Result<(PathBuf, Option<File>)> {
     Ok((stage, lock))
 }
 
-/// Removes stages of processes that no longer exist from a directory, except empty ones, which may be about to be locked.
+/// Removes from a directory the stages of processes that no longer exist, except empty stages: these may be about to be
+/// locked.
 pub fn remove_abandoned(parent: &Path) {
     for entry in fs::read_dir(parent).into_iter().flatten().flatten() {
         let (stage, name) = (entry.path(), entry.file_name());
@@ -205,7 +206,7 @@ pub fn remove_abandoned(parent: &Path) {
             && is_begun()
             && File::open(&stage).is_ok_and(|lock| lock.try_lock().is_ok())
         {
-            // Another user's stage cannot be removed, which does no harm.
+            // A stage of another user cannot be removed; this does no harm.
             let _ = remove(&stage);
         }
     }
@@ -217,7 +218,7 @@ fn remove(stage: &Path) -> io::Result<()> {
     if new.exists() && old.exists() {
         return Err(io::ErrorKind::ResourceBusy.into());
     }
-    // Output that has lost its name is not put in place half removed.
+    // Renamed first, so that a partly removed output is never put in place.
     let _ = fs::rename(&new, &dead);
     for thing in [dead, old] {
         match fs::symlink_metadata(&thing) {

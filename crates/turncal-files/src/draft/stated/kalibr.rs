@@ -15,7 +15,7 @@ const CORRELATION_TIME: f64 = 3600.0;
 /// IMU noise from a Kalibr file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct KalibrImu {
-    /// Samples a second.
+    /// Samples per second.
     pub rate_hz: Option<f64>,
     /// Noise in SI.
     pub noise: PerSensor<Noise>,
@@ -81,7 +81,7 @@ fn keys(sensor: Sensor) -> [&'static str; 2] {
     )
 }
 
-/// A bias that grows like the random walk over times much shorter than its correlation time.
+/// Gauss–Markov bias that grows like the random walk over times much shorter than its correlation time.
 fn bias_of(walk: f64) -> GaussMarkov {
     GaussMarkov {
         sigma: walk * (CORRELATION_TIME / 2.0).sqrt(),

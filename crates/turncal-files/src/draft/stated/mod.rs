@@ -23,13 +23,13 @@ pub struct Stated {
     pub accel_file: Option<DataFile>,
     /// Columns, by name.
     pub columns: StatedColumns,
-    /// Rows a second.
+    /// Rows per second.
     pub rate_hz: Option<f64>,
     /// Geodetic latitude, north positive.
     pub latitude_deg: Option<f64>,
     /// Height above the ellipsoid.
     pub height_m: Option<f64>,
-    /// Gravity at the place.
+    /// Gravity at the site.
     pub gravity_m_s2: Option<f64>,
     /// Unit of the gyros.
     pub gyro_unit: Option<StatedUnit>,
@@ -44,10 +44,10 @@ pub struct Stated {
 /// Errors in reading a data sheet.
 #[derive(Debug, thiserror::Error)]
 pub enum DataSheetError {
-    /// A sensor.
+    /// A sensor could not be read.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// A file of noise figures.
+    /// A file of noise figures could not be read.
     #[error(transparent)]
     File(#[from] FileError),
 }
@@ -59,7 +59,7 @@ impl Stated {
         Sensor::ALL.into_iter().filter_map(of)
     }
 
-    /// The site, with wide σ of what is not stated.
+    /// The site, with a wide σ for every value that is not stated.
     pub fn site(&self) -> Site {
         let latitude = self.latitude_deg.map(|degrees| degrees * DEGREE);
         let site = Site::of_knowledge(latitude, 0.0, self.height_m);
@@ -72,10 +72,10 @@ impl Stated {
     }
 
     /// Adds noise and tolerances of a sensor, by its name or file, and the figures of a Kalibr `imu.yaml`, which
-    /// prevail. A stated rate remains.
+    /// override those of the sensor. A stated rate is kept.
     ///
     /// # Errors
-    /// [`DataSheetError`] if one cannot be read.
+    /// [`DataSheetError`] if the sensor or the file cannot be read.
     pub fn with_data_sheets(
         self,
         sensor: Option<&str>,
@@ -94,7 +94,7 @@ impl Stated {
     }
 }
 
-/// Columns of a table that the user states; the others are detected.
+/// Columns of a table stated by the user; the others are detected.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct StatedColumns {
     /// Columns of each triad along right, front and up.
@@ -129,7 +129,7 @@ pub struct StatedUnit(pub Unit);
 impl StatedUnit {
     /// Parses the unit for the triad of this sensor.
     ///
-    /// # Errors The accepted units, if the text is none of them.
+    /// # Errors The list of accepted units, if the text is not one of them.
     pub fn parse(sensor: Sensor, text: &str) -> Result<Self, String> {
         let is_of_it = |unit: &Unit| match unit.of {
             Of::Rows(of, _) => of == sensor,

@@ -24,7 +24,7 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// For a named unit that is a multiple of one in `run.toml`.
+    /// Size of a named unit that is a multiple of a unit of `run.toml`.
     pub fn of_unit(sensor: Sensor, unit: Unit) -> Option<Self> {
         let of_one = unit_scale(sensor, unit.word).filter(|_| unit.times != 1.0)?;
         let times = rounded(unit.times, 4);
@@ -35,16 +35,16 @@ impl Scale {
         })
     }
 
-    /// From the magnitude at rest, in counts per g, if the zero is the nominal one.
+    /// Size from the magnitude at rest, in counts per g, if the zero is the nominal one.
     pub fn of_gravity(per_g: f64) -> Self {
         let sheet = [2f64.powf(per_g.log2().round())];
         let by = "the magnitude of gravity at rest, if the zero offset is zero";
         Self::measured(per_g, ("g", STANDARD_GRAVITY), &sheet, by)
     }
 
-    /// From turns, in rows per rad: counts per rad/s, or for increments per rad.
+    /// Size from turns, in rows per rad: counts per rad/s, or per rad for increments.
     pub fn of_turns(per_rad: f64, output: Output) -> Self {
-        // Pulses are made as each instrument makes them.
+        // The size of a pulse is specific to each instrument.
         let sheet = match output {
             Output::Rate => &PER_DEGREE[..],
             Output::Pulse | Output::Increment => &[],

@@ -23,8 +23,8 @@ const RELATIVE: f64 = 1e-6;
 const BUDGET: f64 = 1e-3;
 /// Tolerance of the inverse of a matrix, and of outputs relative to the largest.
 const INVERSE: f64 = 1e-9;
-/// A finding states a NIS above its limit of 99.9 %, which is at most this many times as far from one as the upper end
-/// of the 95 % interval (χ², from one degree of freedom to many).
+/// A finding states a NIS above its 99.9 % limit. This limit is at most this many times as far from one as the upper
+/// end of the 95 % interval (χ², for any number of degrees of freedom).
 const BEYOND: f64 = 4.0;
 
 pub fn check_agreement(record: &Calibration) -> Checked {
@@ -39,7 +39,7 @@ pub fn check_agreement(record: &Calibration) -> Checked {
     for sensor in Sensor::ALL {
         check_unit(record, sensor)?;
         let sensitivity = record.triad(sensor).sensitivity();
-        // Whoever inverts a singular matrix refuses it with the cause.
+        // The code that inverts a singular matrix refuses it and gives the cause.
         if sensitivity.try_inverse().is_some() {
             check_inverse(record, sensor)?;
             check_vectors(record, sensor)?;
@@ -112,7 +112,7 @@ fn check_budget(record: &Calibration, budget: &BudgetRecord) -> Checked {
     Ok(())
 }
 
-/// Kinds of findings that this version does not know decide nothing.
+/// Kinds of findings that are unknown to this version do not affect the verdict.
 fn check_verdict(record: &Calibration) -> Checked {
     let Some(stated) = record.verdict.as_ref().map(|verdict| verdict.word) else {
         return Ok(());
@@ -159,8 +159,8 @@ fn check_nis(record: &Calibration, consistency: &ConsistencyRecord) -> Checked {
         let [_, end] = nis_interval;
         expect!(
             is_told || *nis <= 1.0 + BEYOND * (end - 1.0),
-            "the finding W10 or W03 on a NIS beyond its limit",
-            "consistency: NIS ({name}) = {nis}, upper end of nis_interval = {end}, and no finding on it"
+            "finding W10 or W03 for a NIS beyond its limit",
+            "consistency: NIS ({name}) = {nis}, upper end of nis_interval = {end}, and no finding about it"
         );
     }
     Ok(())

@@ -1,4 +1,4 @@
-//! Messages of JSON: the numbers of a message are its columns, by their paths.
+//! JSON messages: each number of a message is a column, named by its path.
 
 use serde_json::Value;
 
@@ -10,7 +10,7 @@ const LONGEST: usize = 64;
 /// Maximum number of columns, as in a spreadsheet.
 const MOST: usize = 16_384;
 
-/// The numbers of a message with their names, a time of seconds and nanoseconds as one.
+/// The numbers of a message with their names; a time of seconds and nanoseconds is one number.
 fn numbers(bytes: &[u8], offset: u64) -> Result<Vec<(String, f64)>, Broken> {
     let value: Value =
         serde_json::from_slice(bytes).map_err(|error| Broken::new(offset, error, "JSON"))?;
@@ -70,7 +70,7 @@ pub fn values(
 ) -> Result<(), Broken> {
     let all = numbers(bytes, offset)?;
     for (place, column) in columns.iter().enumerate() {
-        // As a rule all messages have the same fields.
+        // Usually all messages have the same fields.
         let same = all.get(place).filter(|(name, _)| *name == column.name);
         let found = same.or_else(|| all.iter().find(|(name, _)| *name == column.name));
         row.push(found.map_or(f64::NAN, |&(_, value)| value));

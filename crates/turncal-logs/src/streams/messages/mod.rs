@@ -1,4 +1,4 @@
-//! Topics of a log: messages of one type each, with their log times.
+//! Topics of a log: each contains messages of one type with their log times.
 
 pub mod json;
 pub mod packed;
@@ -77,7 +77,7 @@ pub struct Topics {
 }
 
 impl Topics {
-    /// Adds a number for a topic. A topic may have several: a recorder restarts, or several programs publish.
+    /// Adds a number for a topic. A topic may have several numbers, if a recorder restarts or several programs publish.
     pub fn add(&mut self, number: u32, topic: &str, reader: impl FnOnce() -> Reader) {
         if self.of_number.contains_key(&number) {
             return;

@@ -4,7 +4,7 @@ use std::io::Read;
 
 use crate::streams::bytes::{Broken, Input, most_at_once};
 
-/// Unpacks a chunk at this offset of a file into `size` bytes by the method that the file names.
+/// Unpacks a chunk at this offset of a file into `size` bytes by the method stated in the file.
 pub fn unpack(
     method: &str,
     packed: &[u8],

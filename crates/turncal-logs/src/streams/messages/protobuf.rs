@@ -5,11 +5,11 @@
 use crate::streams::Column;
 use crate::streams::bytes::{Broken, Slice};
 
-/// Messages within messages.
+/// Maximum nesting depth of messages.
 const DEEPEST: usize = 8;
 /// Maximum number of fields that are examined: a type may contain itself several times.
 const MOST_FIELDS: usize = 2048;
-/// Maximum length of a set of descriptors, bytes; usually some thousand.
+/// Maximum length of a set of descriptors, bytes; usually a few thousand.
 const LONGEST: usize = 1 << 19;
 
 /// Label of lists and maps in `FieldDescriptorProto`.
@@ -33,15 +33,15 @@ struct Field {
 }
 
 enum Kind {
-    /// Type, and its value if it is omitted from a message.
+    /// Type, and the value of a field omitted from a message.
     Number(u64, f64),
-    /// Seconds and nanoseconds.
+    /// A time of seconds and nanoseconds.
     Time(Vec<Field>),
     Message(Vec<Field>),
 }
 
 impl Message {
-    /// From a set of descriptors; `None` if a type is missing or malformed.
+    /// The descriptor of a type from a set of descriptors; `None` if a type is missing or malformed.
     pub fn parse(name: &str, set: &[u8]) -> Option<Self> {
         let mut parser = Parser {
             set: Some(set).filter(|set| set.len() <= LONGEST)?,
@@ -149,7 +149,7 @@ impl<'a> Parser<'a> {
                     .strip_prefix(package)
                     .and_then(|own| own.strip_prefix('.')),
             };
-            // Types of a file have the number 4 in it, types within types the number 3.
+            // Types of a file are in its field 4, types within types in field 3.
             let within = |(of, number): (&'a [u8], u64), word: &str| {
                 let mut types = parts(of, number)?.into_iter();
                 Some((types.find(|of| text(of, 1) == Some(word))?, 3))
@@ -186,7 +186,7 @@ fn whole(bytes: &[u8], field: u64) -> Option<u64> {
 /// A value of a message.
 struct Value<'a> {
     field: u64,
-    /// Storage of the field: a number of variable length, of eight bytes (1), with its length, or of four bytes (5).
+    /// Storage of the field: a number of variable length, eight bytes (1), bytes after their length, or four bytes (5).
     way: u64,
     bits: u64,
     bytes: &'a [u8],
@@ -227,7 +227,7 @@ fn signed(value: u64) -> i64 {
     (value >> 1) as i64 ^ -((value & 1) as i64)
 }
 
-/// The values of a message in order; more than memory may hold at once.
+/// The values of a message in order, one at a time because they may not fit into memory.
 struct Values<'a>(Slice<'a>);
 
 /// All values of a descriptor.

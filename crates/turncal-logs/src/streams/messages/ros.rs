@@ -51,7 +51,7 @@ struct Reader<'a> {
     bytes: Slice<'a>,
     /// Origin of the alignment.
     begin: usize,
-    /// The widest alignment.
+    /// Maximum alignment.
     widest: usize,
 }
 
@@ -108,7 +108,7 @@ impl Reader<'_> {
             if let (FieldKind::Number(kind), None) = (&field.kind, &row)
                 && count > 0
             {
-                // All at once; the first aligns them.
+                // All items are read at once; the first one sets the alignment.
                 self.number(*kind)?;
                 self.pass((count - 1).saturating_mul(kind.size()))?;
                 continue;
@@ -130,7 +130,7 @@ impl Reader<'_> {
                     }
                     FieldKind::Message(fields) => self.message(fields, row.as_deref_mut())?,
                 }
-                // Items of no bytes need not be counted out.
+                // Items without bytes need no loop.
                 if self.bytes.position() == before {
                     break;
                 }

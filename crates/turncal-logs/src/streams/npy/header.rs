@@ -133,7 +133,7 @@ fn item_kind(text: &str) -> Option<(Option<(Kind, bool)>, usize)> {
         ("f", 8) => Kind::F64,
         ("M" | "m", 8) => Kind::I64,
         ("b", 1) => Kind::U8,
-        // Text is of four bytes a letter.
+        // Text has four bytes per character.
         ("U", _) => return Some((None, 4 * size)),
         _ => match Kind::whole_number(letter == "i", size) {
             Some(kind) if matches!(letter, "i" | "u") => kind,
@@ -171,7 +171,7 @@ enum Named {
     Array(String, String, Vec<usize>),
 }
 
-/// Converts a Python dictionary to TOML, which differs in brackets, colons and booleans.
+/// Converts a Python dictionary to TOML; the two differ in brackets, colons and booleans.
 fn as_toml(text: &str) -> String {
     let mut quote = None;
     let outside = |c: char| match c {

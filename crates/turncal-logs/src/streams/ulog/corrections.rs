@@ -8,7 +8,7 @@ use super::super::bytes::{Broken, Kind, Slice};
 use super::super::corrections::{Applied, Corrected, Undo};
 use turncal_input::{PerSensor, Sensor};
 
-/// Numbers of calibrations of a kind of sensor.
+/// Number of calibrations stored for each kind of sensor.
 const CALIBRATIONS: usize = 4;
 
 /// `P` messages, and the devices selected by PX4.
@@ -21,7 +21,7 @@ pub struct Parameters {
 }
 
 impl Parameters {
-    /// No parameters yet, with these selected devices.
+    /// A state without parameters so far, with these selected devices.
     pub fn of(selected: PerSensor<Option<f64>>) -> Self {
         Self {
             selected,
@@ -106,7 +106,7 @@ pub fn selects(topic: &str, columns: &[Column]) -> PerSensor<Option<usize>> {
     })
 }
 
-/// The corrections of the samples of a topic, which must be removed.
+/// The corrections to be removed from the samples of a topic.
 pub fn of_topic(topic: &str, columns: &[Column]) -> Undo {
     let place = |name: &str| columns.iter().position(|column| column.name == name);
     let corrected = PerSensor::from_fn(|sensor| {
@@ -132,7 +132,7 @@ pub fn of_topic(topic: &str, columns: &[Column]) -> Undo {
         };
         match topic {
             "vehicle_imu" => Some(Corrected {
-                // Before version 1.12 one interval served both.
+                // Before version 1.12, both triads shared one interval.
                 interval: Some(place(interval).or_else(|| place("dt"))?),
                 device: place(device),
                 ..triad(increments)?

@@ -103,7 +103,7 @@ impl Log for Ulog {
                         "a topic subscribed before its data",
                     ));
                 }
-                // More that is said of the log, its text messages, marks and lost data.
+                // Other information about the log, text messages, marks and lost data.
                 b'M' | b'Q' | b'R' | b'L' | b'C' | b'S' | b'O' => {}
                 other => {
                     return Err(Broken::new(
@@ -179,7 +179,7 @@ impl Ulog {
         let size = head.whole(2, "a message size")?;
         let kind = head.whole(1, "a message type")? as u8;
         let end = self.offset + 3 + size;
-        // A message that the appended data cut off never ended.
+        // A message cut off by the appended data has no end.
         let cut = self
             .appended
             .iter()

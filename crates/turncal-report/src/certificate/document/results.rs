@@ -5,7 +5,7 @@ use crate::prelude::*;
 use turncal::calibration::Group;
 use turncal::imu::{Sensor, Term};
 
-/// A value and its U as EA-4/02, 6.3 wants them: U to two digits, the value to the same place.
+/// A value and its U rounded as required by EA-4/02, 6.3: U to two digits, the value to the same place.
 pub fn two_digits(of: f64, expanded: f64) -> (f64, f64) {
     let place = 10f64.powf((expanded.log10() - 1.0).floor());
     if place > 1.0 {
@@ -22,7 +22,7 @@ pub fn two_digits(of: f64, expanded: f64) -> (f64, f64) {
 pub fn results(certificate: &Certificate) -> Table {
     let has_budget = certificate.calibration.budget.is_some();
     let row = |of: &Measured| {
-        // Only a budget evaluates them, and it is one of the triads' parameters.
+        // Only a budget gives degrees of freedom, and only for parameters of the triads.
         let infinite = match of.quantity {
             Quantity::Parameters(_) if has_budget => "∞",
             _ => NONE,

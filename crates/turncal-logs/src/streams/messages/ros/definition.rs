@@ -6,7 +6,7 @@ use crate::streams::bytes::Kind;
 /// Maximum length of an array that becomes columns.
 const LONGEST: usize = 64;
 
-/// Types within types.
+/// Maximum nesting depth of types.
 const DEEPEST: usize = 16;
 /// Maximum number of fields of an instrument message.
 const MOST_FIELDS: usize = 4096;
@@ -28,7 +28,7 @@ pub struct Field {
 pub enum FieldKind {
     Number(Kind),
     Text,
-    /// Seconds and nanoseconds.
+    /// A time of seconds and nanoseconds.
     Time(Kind),
     Message(Vec<Field>),
 }
@@ -39,7 +39,7 @@ pub enum Many {
     One,
     /// A fixed number.
     Fixed(usize),
-    /// Number stated in the message.
+    /// A number stated in the message.
     Any,
 }
 
@@ -193,7 +193,7 @@ impl Parser {
             }
             _ => vec![format!("{path}.")],
         };
-        // Items of a list are one definition; its columns come once an item.
+        // The items of a list share one definition; its columns are repeated for each item.
         let mut fields = Vec::new();
         for prefix in &prefixes {
             fields = self.of_type(of, prefix, is_column, depth + 1)?;
