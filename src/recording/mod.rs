@@ -13,7 +13,7 @@ mod temperature;
 pub use faults::{Bridge, Fault, FaultKind, Slower};
 pub use log_facts::{ColumnFacts, LogFacts, NamedColumns, TemperatureFacts};
 pub use near::Near;
-pub use samples::stretches_between;
+pub use samples::{FEWEST_SAMPLES, stretches_between};
 pub use samples::{ImuSamples, SampleError, Stretch};
 pub use segment::{LabelledMotion, Segment};
 pub use series::Series;

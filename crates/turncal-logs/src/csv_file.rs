@@ -21,6 +21,8 @@ use lines::{LONGEST, Lines, Stop};
 use row::{LONGEST_FIELD, MOST_COLUMNS, Malformed, Row};
 use turncal_input::{FileError, Place};
 
+/// Begin of the remark on names in the middle of a file.
+const REPEATED: &str = "turncal skipped repeated column names";
 /// First bytes of a gzipped file.
 const GZIP: [u8; 2] = [0x1f, 0x8b];
 
@@ -98,6 +100,30 @@ impl CsvFile {
             .map_or_else(Vec::new, |tags| tags.names))
     }
 
+    /// Whether the row has the names of these columns again, as where files are joined.
+    fn repeats_names(&self, used: &[usize]) -> bool {
+        let is_name = |&column: &usize| {
+            let name = &self.heading.names[column];
+            // Columns without names are numbered.
+            name.parse::<f64>().is_err() && self.bytes(column) == name.as_bytes()
+        };
+        !used.is_empty() && used.iter().all(is_name)
+    }
+
+    /// Remarks once that names are repeated.
+    fn remark_on_names(&mut self) {
+        let (file, line) = (self.file.display(), self.line);
+        let remark = format!("{REPEATED} in {file}, the first in line {line}.");
+        if !self
+            .heading
+            .remarks
+            .iter()
+            .any(|of| of.starts_with(REPEATED))
+        {
+            self.heading.remarks.push(remark);
+        }
+    }
+
     fn bytes(&self, column: usize) -> &[u8] {
         self.row.get(column).unwrap_or_default().trim_ascii()
     }
@@ -158,6 +184,7 @@ impl Rows for CsvFile {
             self.line = line.number;
             match &self.tag {
                 Some((column, tag)) if self.bytes(*column) != tag.as_bytes() => {}
+                _ if self.repeats_names(used) => self.remark_on_names(),
                 _ => break split,
             }
         };
