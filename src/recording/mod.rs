@@ -25,6 +25,7 @@ use std::path::PathBuf;
 
 use nalgebra::UnitQuaternion;
 
+use crate::imu::AxisOrder;
 use crate::turntable::AxisAngles;
 pub use turncal_input::FileColumn;
 pub use turncal_input::units::nanoseconds;
@@ -72,6 +73,25 @@ impl Recording {
     ) -> Result<Self, SampleError> {
         let imu = ImuSamples::new(start, period, gyro, accel)?;
         Ok(Self::of(name, imu))
+    }
+
+    /// Takes its name, such as `x_up`, as the label of a position.
+    pub fn label_by_name(&mut self) {
+        let (imu, label) = (&self.imu, self.name.to_lowercase());
+        let axes = imu
+            .log
+            .as_ref()
+            .map_or(AxisOrder::IDENTITY, |log| log.named.axes);
+        let motion = LabelledMotion::of_label(&label, axes);
+        if let Some(LabelledMotion::Stands { .. }) = motion {
+            self.segments.push(Segment {
+                start: imu.start(),
+                end: imu.end(),
+                samples: 0..imu.len(),
+                label,
+                motion,
+            });
+        }
     }
 
     /// A recording of these samples alone.

@@ -97,7 +97,9 @@ impl Opened {
         }
         let opened = paths.iter().zip(drafts).map(|(path, draft)| {
             show(path, &draft);
-            Self::of_draft(&path.as_path().into(), &[], draft)
+            let mut opened = Self::of_draft(&path.as_path().into(), &[], draft)?;
+            opened.run.recording.label_by_name();
+            Ok(opened)
         });
         opened.collect::<Result<_, _>>().map(Some)
     }

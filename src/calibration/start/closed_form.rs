@@ -4,7 +4,7 @@
 use super::both_triads::both_triads;
 use super::coarse::{Turned, calibrated, dwells};
 use super::gravity::AtRest;
-use super::gravity_alone::{Standing, standing};
+use super::gravity_alone::standing;
 use super::labels::{Section, Used};
 use super::positions::{Observed, Position};
 use super::{labels, table};
@@ -21,7 +21,7 @@ use crate::calibration::{
 use crate::calibration::{Verdict, Word};
 use crate::earth::Site;
 use crate::imu::{BodyFrame, PerSensor, Sensor};
-use crate::run::motion::{self, rests};
+use crate::run::motion::rests;
 use crate::run::{Aiding, Dwell};
 
 /// Cosine above which a reference vector lies along a body axis, so that its position is one of the six.
@@ -249,26 +249,16 @@ fn by_gravity(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
 
 /// The closed form from every dwell with gravity as the only reference; what the dwells do not show keeps the prior.
 fn by_gravity_alone(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
-    let run = problem.run();
-    let Standing {
-        estimate,
-        residuals,
-        rests,
-    } = standing(problem)?;
-    let contradicted = Used::of(run, &motion::rests(run)).contradicted;
-    let far = far_by_data(&problem.model, &estimate).into_iter();
-    let findings = far
-        .chain(hidden(&problem.model, &estimate, Reference::GravityAlone))
-        .chain(residuals.finding("the accelerometers"))
-        .chain(checks::labels::contradicted(&contradicted));
-    let count = rests.iter().map(Vec::len).sum();
+    let found = standing(problem)?;
+    let far = far_by_data(&problem.model, &found.estimate).into_iter();
+    let hidden = hidden(&problem.model, &found.estimate, Reference::GravityAlone);
     Ok(ClosedForm {
-        findings: findings.collect(),
-        estimate,
+        findings: far.chain(hidden).chain(found.findings).collect(),
+        estimate: found.estimate,
         reference: Reference::GravityAlone,
-        positions: PerSensor::from_fn(|_| count),
+        positions: PerSensor::from_fn(|_| found.count),
         turns: 0,
-        standing_time: rests.iter().flatten().map(AtRest::duration).sum(),
+        standing_time: found.time,
     })
 }
 

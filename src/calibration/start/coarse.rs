@@ -13,7 +13,7 @@ use crate::calibration::{
     from_vector, to_vector,
 };
 use crate::earth::Site;
-use crate::imu::{PerSensor, Sensor, TermVector, Triad};
+use crate::imu::{Sensor, TermVector};
 
 /// With more equations (a hundred dwells), parameters cannot absorb noise.
 const MOST_EQUATIONS: usize = 600;
@@ -123,24 +123,15 @@ pub struct Turned {
     pub equations: Equations,
 }
 
-/// The accelerometers from the magnitude of gravity.
-pub fn by_magnitude(
-    problem: &Problem,
-    dwells: &[Vec<AtRest>],
-) -> Result<PerSensor<Triad>, CalibrationError> {
-    let model = &problem.model;
-    let prior = from_vector(model.form, &model.prior_mean);
-    gauss_newton(prior, &ParameterVector::repeat(SMALL), |triads| {
-        let mut equations = Equations::of_triads(model, triads, &[Sensor::Accel]);
-        add_magnitude(&mut equations, problem, dwells, triads)?;
-        equations.step()
-    })
-}
-
 /// Both triads and attitudes from gravity and Earth rate; first only the accelerometers, from the magnitude of gravity.
 pub fn calibrated(problem: &Problem, dwells: &[Vec<AtRest>]) -> Result<Turned, CalibrationError> {
     let model = &problem.model;
-    let triads = by_magnitude(problem, dwells)?;
+    let prior = from_vector(model.form, &model.prior_mean);
+    let triads = gauss_newton(prior, &ParameterVector::repeat(SMALL), |triads| {
+        let mut equations = Equations::of_triads(model, triads, &[Sensor::Accel]);
+        add_magnitude(&mut equations, problem, dwells, triads)?;
+        equations.step()
+    })?;
     let first = dwells
         .iter()
         .map(|dwells| Ok(level(&up(&triads, &dwells[0])?)));

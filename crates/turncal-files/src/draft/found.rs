@@ -102,6 +102,14 @@ impl Draft {
 
     fn time_found(&self) -> Found {
         let clock = &self.clock;
+        if self.of_means {
+            return Found::new(
+                "time",
+                "none",
+                Certainty::Guess,
+                "a row is the mean of a position",
+            );
+        }
         let name = self.columns.time.map(|k| self.columns.names[k].as_str());
         let hertz = |rate: f64| format!("{} Hz", rounded(rate, 4));
         let (value, certainty) = match (name, clock.period.map(f64::recip)) {
