@@ -185,8 +185,11 @@ fn real_faces_give_the_biases_of_their_pairs() {
             );
         }
         let names = |of: &str| result[of].to_string();
+        let of_z = result["sigma"]["accel"]["bias"][2].as_f64().unwrap();
+        // One face tells scale and bias of its axis only together.
         assert!(
-            names("fixed").contains("accel.bias.z") && !names("parameters").contains("gyro.scale")
+            of_z > 100.0 && !names("parameters").contains("gyro.scale"),
+            "{of_z} counts"
         );
         assert_eq!(names("findings").contains("The labels contradict"), wrong);
     }

@@ -312,11 +312,8 @@ impl Calibrate {
             [_] => vec![path],
             several => several.iter().map(PathBuf::as_path).collect(),
         };
-        let inputs: Vec<&Path> = sources
-            .iter()
-            .copied()
-            .chain(self.truth.as_deref())
-            .collect();
+        let mut inputs = sources.clone();
+        inputs.extend(self.truth.as_deref());
         let begin = |target: &PathBuf| self.overwrite.directory(target, &inputs);
         let directory = target.as_ref().map(begin).transpose()?;
 
@@ -324,8 +321,7 @@ impl Calibrate {
         let solution = solve(problem, self.estimation.method, &activity)
             .inspect_err(|_| say(&run.recording))?;
         let mut checked = CheckedCalibration::new(problem, solution)?;
-        let paths = sources.iter().copied();
-        record_inputs(&mut checked.calibration, paths, run);
+        record_inputs(&mut checked.calibration, sources, run);
         activity.next("writing");
         // JSON on standard output has no report.
         let document = (directory.is_some() || !self.json).then(|| {
