@@ -33,10 +33,11 @@ impl Problem<'_> {
     /// # Errors
     /// [`CalibrationError`] if the runs cannot give a calibration by this method.
     pub fn solve(&self, method: Method, progress: Progress) -> Result<Solution, CalibrationError> {
-        if self.lacks(Sensor::Accel) {
-            return Err(CalibrationError::OneTriad {
-                sensor: Sensor::Accel,
-            });
+        let is_missing = |&sensor: &Sensor| {
+            self.lacks(sensor) && (sensor == Sensor::Accel || !self.shows_gravity_alone())
+        };
+        if let Some(sensor) = Sensor::ALL.into_iter().find(is_missing) {
+            return Err(CalibrationError::OneTriad { sensor });
         }
         if let Some((run, contradiction)) = Contradiction::of(self) {
             return Err(CalibrationError::Contradicted {

@@ -186,6 +186,9 @@ impl Positions<'_> {
         let of_triad = estimate
             .covariance
             .fixed_view::<PER_TRIAD, PER_TRIAD>(first, first);
+        if !of_triad.iter().all(|of| of.is_finite()) {
+            return ParameterMatrix::zeros();
+        }
         let eigen = of_triad.into_owned().symmetric_eigen();
         let sigmas: Vec<TriadVector> = (0..PER_TRIAD)
             .map(|k| eigen.eigenvectors.column(k) * eigen.eigenvalues[k].max(0.0).sqrt())
