@@ -19,8 +19,10 @@ pub enum CalibrationError {
     NoTable,
     /// A log with only one triad.
     #[error(
-        "the log has no {0} columns, and a calibration needs both triads. Name the columns in run.toml, or analyse \
-         the noise of the other triad with `turncal allan`", .sensor.name()
+        "the log has no {0} columns, and {1}. Name the columns in run.toml, or analyse the noise of the other triad with \
+         `turncal allan`",
+        .sensor.name(),
+        .sensor.pick("with a table or a temperature, a calibration needs both triads", "every calibration needs gravity")
     )]
     OneTriad {
         /// The missing triad.

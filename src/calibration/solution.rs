@@ -1,9 +1,10 @@
 //! Solution of a problem by either method, with its assessment.
 
 use crate::calibration::result::Provenance;
+use crate::calibration::start::closed_form::six_position_by;
 use crate::calibration::{
     Budget, Calibration, CalibrationError, ClosedForm, Contradiction, Estimate, Finding, Method,
-    Outcome, Problem, Progress, Quality, estimate, six_position,
+    Outcome, Problem, Progress, Quality, Reference, estimate, six_position,
 };
 use crate::imu::{PerSensor, Sensor};
 use crate::units::DEGREE;
@@ -32,8 +33,10 @@ impl Problem<'_> {
     /// # Errors
     /// [`CalibrationError`] if the runs cannot give a calibration by this method.
     pub fn solve(&self, method: Method, progress: Progress) -> Result<Solution, CalibrationError> {
-        let lacks = |&sensor: &Sensor| self.runs().any(|run| !run.recording.imu.has(sensor));
-        if let Some(sensor) = Sensor::ALL.into_iter().find(lacks) {
+        let is_missing = |&sensor: &Sensor| {
+            self.lacks(sensor) && (sensor == Sensor::Accel || !self.shows_gravity_alone())
+        };
+        if let Some(sensor) = Sensor::ALL.into_iter().find(is_missing) {
             return Err(CalibrationError::OneTriad { sensor });
         }
         if let Some((run, contradiction)) = Contradiction::of(self) {
@@ -43,6 +46,10 @@ impl Problem<'_> {
             });
         }
         Ok(match method {
+            Method::Ekf if self.shows_gravity_alone() => {
+                let closed_form = six_position_by(Reference::GravityAlone, self)?;
+                Solution::ClosedForm(Box::new(closed_form))
+            }
             Method::Ekf => Solution::Filter(Box::new(estimate(self, progress)?)),
             Method::SixPosition => Solution::ClosedForm(Box::new(six_position(self)?)),
         })

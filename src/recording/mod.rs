@@ -13,7 +13,7 @@ mod temperature;
 pub use faults::{Bridge, Fault, FaultKind, Slower};
 pub use log_facts::{ColumnFacts, LogFacts, NamedColumns, TemperatureFacts};
 pub use near::Near;
-pub use samples::stretches_between;
+pub use samples::{FEWEST_SAMPLES, stretches_between};
 pub use samples::{ImuSamples, SampleError, Stretch};
 pub use segment::{LabelledMotion, Segment};
 pub use series::Series;
@@ -25,6 +25,7 @@ use std::path::PathBuf;
 
 use nalgebra::UnitQuaternion;
 
+use crate::imu::AxisOrder;
 use crate::turntable::AxisAngles;
 pub use turncal_input::FileColumn;
 pub use turncal_input::units::nanoseconds;
@@ -72,7 +73,26 @@ impl Recording {
         Ok(Self::of(name, imu))
     }
 
-    /// A recording of only these samples.
+    /// Takes its name, such as `x_up`, as the label of a position.
+    pub fn label_by_name(&mut self) {
+        let (imu, label) = (&self.imu, self.name.to_lowercase());
+        let axes = imu
+            .log
+            .as_ref()
+            .map_or(AxisOrder::IDENTITY, |log| log.named.axes);
+        let motion = LabelledMotion::of_label(&label, axes);
+        if let Some(LabelledMotion::Stands { .. }) = motion {
+            self.segments.push(Segment {
+                start: imu.start(),
+                end: imu.end(),
+                samples: 0..imu.len(),
+                label,
+                motion,
+            });
+        }
+    }
+
+    /// A recording of these samples alone.
     pub fn of(name: &str, imu: ImuSamples) -> Self {
         Self {
             name: name.to_owned(),

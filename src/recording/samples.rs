@@ -38,7 +38,15 @@ pub struct ImuSamples {
     pub log: Option<LogFacts>,
 }
 
+/// Fewest samples of a recording; with fewer, dwells and turns cannot be distinguished.
+pub const FEWEST_SAMPLES: usize = 100;
+
 impl ImuSamples {
+    /// Whether each sample is the mean output in a position, as in a table of six means.
+    pub fn is_of_means(&self) -> bool {
+        !self.continuous && self.len() < FEWEST_SAMPLES
+    }
+
     /// Whether a triad was recorded; otherwise its samples are zeros.
     pub fn has(&self, sensor: Sensor) -> bool {
         let is_named = |log: &LogFacts| !log.named.triads.get(sensor)[0].name.is_empty();

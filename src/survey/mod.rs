@@ -12,8 +12,9 @@ pub use evaluator::{Due, Evaluator, GROWTH, InterimCalibration, Status};
 pub use session::Session;
 
 use crate::calibration::{
-    Bound, CalibrationError, Contradiction, Estimate, Group, OBSERVED_BELOW, Options,
-    ParameterVector, Problem, bound, coarse_start, parameter_name, six_position, stacked,
+    Bound, CalibrationError, Contradiction, Estimate, Group, Method, OBSERVED_BELOW, Options,
+    ParameterVector, Problem, UNWATCHED, bound, coarse_start, parameter_name, six_position,
+    stacked,
 };
 use crate::imu::{BodyFrame, InstallationForm, MotionNoise, TermVector};
 use crate::run::motion::{self, LabelCheck, Rest, Turn};
@@ -160,6 +161,11 @@ impl Expected {
             Path::VelocityAiding => Aiding::Velocity,
         };
         let options = Options::default().aiding(aiding);
+        let problem = Problem::new(run, &options);
+        if problem.shows_gravity_alone() {
+            let solution = problem.solve(Method::Ekf, UNWATCHED)?;
+            return Ok(summary(run, aiding.body_frame(), solution.estimate()));
+        }
         let bound = bound_of_record(run, &options)?;
         Ok(summary(run, aiding.body_frame(), &bound.estimate))
     }

@@ -23,6 +23,7 @@ mod features;
 mod field;
 mod follow;
 mod fuzz;
+mod gravity;
 mod help;
 mod init;
 #[cfg(unix)]

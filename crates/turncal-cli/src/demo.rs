@@ -86,7 +86,7 @@ impl Demo {
             (of_filter, &root, &turning.run, filtered),
             (of_closed_form, &closed, &standing.run, closed.clone()),
         ] {
-            record_inputs(&mut record, &of.join("run.toml"), run);
+            record_inputs(&mut record, [&*of.join("run.toml")], run);
             write_calibration(&record, &path.join("calibration.json"), false)?;
         }
         write_report(&document, &root.join("report"))?;

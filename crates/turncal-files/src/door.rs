@@ -74,6 +74,36 @@ impl Opened {
         Self::of_file(file, files, (stream, stated), show)
     }
 
+    /// Reads several logs of one sensor, each of one position; `None` if it was turned in one.
+    ///
+    /// # Errors
+    /// As for [`Self::new`], and if the logs have different columns.
+    pub fn of_positions(
+        paths: &[PathBuf],
+        (stream, stated): (Option<&str>, &Stated),
+        mut show: impl FnMut(&Path, &Draft),
+    ) -> Result<Option<Vec<Self>>, FileError> {
+        let mut drafts: Vec<Draft> = Vec::new();
+        for path in paths {
+            let mut draft = Draft::of_stream(&path.as_path().into(), stream, stated)?;
+            if !draft.is_of_one_position() {
+                return Ok(None);
+            }
+            match drafts.first() {
+                Some(first) => draft.as_in(path, first)?,
+                None => draft.leave_out_gyros(),
+            }
+            drafts.push(draft);
+        }
+        let opened = paths.iter().zip(drafts).map(|(path, draft)| {
+            show(path, &draft);
+            let mut opened = Self::of_draft(&path.as_path().into(), &[], draft)?;
+            opened.run.recording.label_by_name();
+            Ok(opened)
+        });
+        opened.collect::<Result<_, _>>().map(Some)
+    }
+
     fn of_file(
         file: &DataFile,
         in_memory: &[DataFile],
@@ -95,6 +125,10 @@ impl Opened {
         }
         let draft = Draft::of_stream(file, stream, stated)?;
         show(&draft);
+        Self::of_draft(file, in_memory, draft)
+    }
+
+    fn of_draft(file: &DataFile, in_memory: &[DataFile], draft: Draft) -> Result<Self, FileError> {
         draft.check(file)?;
         let name = file.file_name().unwrap_or_default().to_string_lossy();
         let mut run = crate::run_of_text(file, &draft.to_toml(&name), None, in_memory)?;

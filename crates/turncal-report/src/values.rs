@@ -127,7 +127,7 @@ fn unobserved(calibration: &Calibration) -> usize {
     named.flatten().filter(is_own).count()
 }
 
-/// Determined values of each triad, such as `gyros: D only; accelerometers: 9 of 9`.
+/// Determined values of each triad, such as `gyros: D only; accelerometers: 6 of 9 (K, D)`.
 fn determined(calibration: &Calibration) -> String {
     let of_triad = |sensor: Sensor| {
         let kinds = [("scale", "K"), ("installation", "E"), ("bias", "D")];
@@ -151,10 +151,15 @@ fn determined(calibration: &Calibration) -> String {
                 }
             })
             .collect();
-        let words = match known {
-            0 => "nothing".to_owned(),
+        // A record names the columns only of both triads.
+        if known == 0 && sensor == Sensor::Gyro && calibration.columns.is_none() {
+            return Some("no gyros".to_owned());
+        }
+        let words = match (known, &parts[..]) {
+            (0, _) => "nothing".to_owned(),
             _ if known == asked => format!("{known} of {asked}"),
-            _ => format!("{} only", parts.join(", ")),
+            (_, [one]) => format!("{one} only"),
+            _ => format!("{known} of {asked} ({})", parts.join(", ")),
         };
         (asked > 0).then(|| format!("{}: {words}", triad_name(sensor)))
     };

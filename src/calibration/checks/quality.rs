@@ -275,6 +275,7 @@ fn residuals(
     let mut number = 0;
     for (stretch, initial) in problem.stretches().iter().zip(&at.initial_attitudes) {
         let run = stretch.run;
+        let has_gyros = run.recording.imu.has(Sensor::Gyro);
         let during = |samples: &Range<usize>| {
             at.instrument(&problem.model, (run, stretch.recording), samples)
         };
@@ -298,7 +299,7 @@ fn residuals(
                 dwells.push(DwellResidual {
                     number,
                     gravity: force.norm() - run.site.gravity,
-                    direction: before.map(|_| off.norm()),
+                    direction: before.filter(|_| has_gyros).map(|_| off.norm()),
                 });
             }
             carried = exp(off) * carried;

@@ -16,6 +16,7 @@ use crate::calibration::estimate::largest_growth;
 use crate::calibration::start::equations::{Common, Equations, Rows, of, of_parameters};
 use crate::calibration::{Finding, FindingKind as Kind, ParameterMatrix, Problem, parameter};
 use crate::imu::{Output, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
+use crate::recording::LogFacts;
 use crate::run::{Aiding, Run};
 use crate::units::DEGREE;
 
@@ -116,7 +117,10 @@ fn of_triad(
 /// the remainder.
 fn steps(run: &Run, sensor: Sensor) -> Vector3<f64> {
     let imu = &run.recording.imu;
-    let Some(log) = imu.log.as_ref().filter(|log| log.output == Output::Rate) else {
+    // Means of positions are few, so their steps are not those of rounding.
+    let is_rounded = imu.has(sensor) && !imu.is_of_means();
+    let of_rates = |log: &&LogFacts| is_rounded && log.output == Output::Rate;
+    let Some(log) = imu.log.as_ref().filter(of_rates) else {
         return Vector3::zeros();
     };
     Vector3::from_fn(|axis, _| {

@@ -13,8 +13,8 @@ use super::{
 use crate::calibration::parameters::{Before, factor};
 use crate::calibration::{
     AtRest, Auxiliary, Budget, ClosedForm, Estimate, Finding, Nis, Outcome, PARAMETERS,
-    ParameterVector, Problem, Quality, TermEvidence, Verdict, auxiliary_name, from_vector,
-    parameter_name,
+    ParameterVector, Problem, Quality, Reference, TermEvidence, Verdict, auxiliary_name,
+    from_vector, parameter_name,
 };
 use crate::imu::{BodyFrame, InstallationForm, Nominal, Output, PerSensor, Sensor, Triad};
 use crate::run::Run;
@@ -128,7 +128,14 @@ impl GravityRecord {
 impl ClosedForm {
     /// The record of this calibration of a problem, with the residuals of gravity and turns.
     pub fn record(&self, problem: &Problem, quality: &Quality) -> Calibration {
-        let run = problem.run();
+        let (run, body_frame) = (problem.run(), self.reference.body_frame());
+        let record = match self.reference {
+            Reference::GravityAlone => {
+                let before = problem.model.before();
+                self.estimate.usable_record(before, run, body_frame)
+            }
+            _ => self.estimate.record(run, body_frame),
+        };
         let record = Calibration {
             quality: Some(quality.clone()),
             method: Some(Method::SixPosition),
@@ -137,7 +144,7 @@ impl ClosedForm {
                 run.site.gravity,
                 run.site.gravity_sigma,
             ))),
-            ..self.estimate.record(run, self.reference.body_frame())
+            ..record
         };
         record.with_findings(self.findings.clone())
     }

@@ -4,6 +4,7 @@
 use super::both_triads::both_triads;
 use super::coarse::{Turned, calibrated, dwells};
 use super::gravity::AtRest;
+use super::gravity_alone::standing;
 use super::labels::{Section, Used};
 use super::positions::{Observed, Position};
 use super::{labels, table};
@@ -35,6 +36,8 @@ pub enum Reference {
     Labels,
     /// Only gravity: its magnitude at rest and its direction before and after each turn.
     Gravity,
+    /// Only gravity at rest: there are no gyros, or no turns.
+    GravityAlone,
 }
 
 impl Reference {
@@ -42,7 +45,7 @@ impl Reference {
     pub fn body_frame(self) -> BodyFrame {
         match self {
             Self::Table | Self::Labels => BodyFrame::Table,
-            Self::Gravity => BodyFrame::Accelerometer,
+            Self::Gravity | Self::GravityAlone => BodyFrame::Accelerometer,
         }
     }
 }
@@ -84,6 +87,8 @@ pub fn six_position(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
     let sections = &problem.run().recording.segments;
     let reference = if problem.model.aiding == Aiding::Table {
         Reference::Table
+    } else if problem.lacks(Sensor::Gyro) {
+        Reference::GravityAlone
     } else if sections.iter().any(|s| s.motion.is_some()) {
         Reference::Labels
     } else {
@@ -104,6 +109,7 @@ pub fn six_position_by(
         }
         Reference::Labels => by_labels(problem),
         Reference::Gravity => by_gravity(problem),
+        Reference::GravityAlone => by_gravity_alone(problem),
     }?;
     let ClosedForm {
         estimate, findings, ..
@@ -241,6 +247,21 @@ fn by_gravity(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
     })
 }
 
+/// The closed form from every dwell with gravity as the only reference; what the dwells do not show keeps the prior.
+fn by_gravity_alone(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
+    let found = standing(problem)?;
+    let far = far_by_data(&problem.model, &found.estimate).into_iter();
+    let hidden = hidden(&problem.model, &found.estimate, Reference::GravityAlone);
+    Ok(ClosedForm {
+        findings: far.chain(hidden).chain(found.findings).collect(),
+        estimate: found.estimate,
+        reference: Reference::GravityAlone,
+        positions: PerSensor::from_fn(|_| found.count),
+        turns: 0,
+        standing_time: found.time,
+    })
+}
+
 /// Parameters hardly better known than from the prior, if any.
 fn hidden(model: &Model, estimate: &Estimate, reference: Reference) -> Option<Finding> {
     let names = estimate.unobserved(&model.prior_sigma).into_iter();
@@ -251,6 +272,7 @@ fn hidden(model: &Model, estimate: &Estimate, reference: Reference) -> Option<Fi
         Reference::Table => "these positions",
         Reference::Labels => "these sections",
         Reference::Gravity => "these dwells and moves",
+        Reference::GravityAlone => return not_observed("gravity in these dwells", hidden),
     };
     // The values are stated as the closed form gives them.
     not_observed(by, hidden).map(|finding| finding.at(Level::Care))

@@ -110,17 +110,17 @@ pub fn of_noise<const N: usize>(
 }
 
 /// The mean specific force in a dwell.
-struct Force {
+pub struct Force {
     /// Magnitude, m/s²; not zero.
-    size: f64,
+    pub size: f64,
     /// Up along body axes.
-    up: Vector3<f64>,
+    pub up: Vector3<f64>,
     /// Error of the force per error of each accelerometer parameter.
-    error: OfTriad<3>,
+    pub error: OfTriad<3>,
 }
 
 impl Force {
-    fn of(triads: &PerSensor<Triad>, dwell: &AtRest) -> Result<Self, CalibrationError> {
+    pub fn of(triads: &PerSensor<Triad>, dwell: &AtRest) -> Result<Self, CalibrationError> {
         let triad = &triads.accel;
         let correction = triad.correction().ok_or_else(|| singular(triads))?;
         let force = correction * (dwell.mean.accel.output - triad.bias);

@@ -28,7 +28,7 @@ pub const STILL_SIGMAS: f64 = 6.0;
 /// Rate, rad/s: drift of the worst bias within seconds.
 pub const STILL_RATE: f64 = 100.0 * DEG_PER_H;
 /// Force, m/s²: that of a turn by 0.02°.
-const STILL_FORCE: f64 = 3e-3;
+pub const STILL_FORCE: f64 = 3e-3;
 /// False-alarm rate of the test that ends a standstill at a window that differs from its neighbours: an axis
 /// has started to turn, or still settles. A false alarm costs a window.
 const SETTLED: f64 = 0.01;
@@ -184,8 +184,10 @@ pub fn standstills(run: &Run) -> Vec<Range<usize>> {
     let is_steady = |k: usize| steady(k, k.wrapping_sub(apart)) && steady(k, k + apart);
     let still = gyro.at_rest(run, rate, is_steady);
     let still = ranges(gyro.means.len(), |k| still[k]).into_iter();
+    // Without gyros, gravity shows where a move begins and ends.
+    let shows = if imu.has(Sensor::Gyro) { &gyro } else { &accel };
     let standstills = still.filter_map(|still| {
-        let Range { mut start, mut end } = gyro.settled(still);
+        let Range { mut start, mut end } = shows.settled(still);
         // A move begins and ends too gently to be visible in the windows at its ends.
         let is_known = |sample: usize| !imu.is_lost(&(sample..sample + 1));
         if start.checked_sub(1).is_some_and(is_known) {

@@ -10,9 +10,10 @@ use nalgebra::Vector3;
 
 use super::dwell::{Dwell, SHORTEST, common};
 use super::{Aiding, Run};
+use crate::imu::Sensor;
 use crate::recording::{LabelledMotion, Segment};
 use crate::units::DEGREE;
-use imu::{STILL_RATE, STILL_SIGMAS};
+use imu::{STILL_FORCE, STILL_RATE, STILL_SIGMAS};
 
 /// Gyro integrals below this, beyond noise and bias drift, are not a turn, rad.
 const STILL_ANGLE: f64 = 0.1 * DEGREE;
@@ -25,6 +26,9 @@ impl Run {
     /// by a wild reading or a knock).
     pub fn dwells(&self, aiding: Aiding) -> Vec<Dwell> {
         let imu = &self.recording.imu;
+        if imu.is_of_means() {
+            return (0..imu.len()).map(|k| Dwell::of(k..k + 1)).collect();
+        }
         if !imu.continuous && !self.recording.segments.is_empty() {
             return self.labelled_dwells();
         }
@@ -108,7 +112,18 @@ impl Run {
         let positions = before.position.as_ref().zip(after.position.as_ref());
         positions.is_none_or(|(before, after)| table::same_reading(self, before, after))
             && self.recording.imu.unbroken(&between)
-            && !self.turns(between, before)
+            && if self.recording.imu.has(Sensor::Gyro) {
+                !self.turns(between, before)
+            } else {
+                self.same_force(before, after)
+            }
+    }
+
+    /// Whether the accelerometers, within noise, give the same force in two dwells.
+    fn same_force(&self, before: &Dwell, after: &Dwell) -> bool {
+        let [before, after] = [before, after].map(|dwell| dwell.mean(Sensor::Accel, self));
+        let noise = (before.variance + after.variance).sqrt();
+        (before.output - after.output).norm() < STILL_FORCE + STILL_SIGMAS * noise
     }
 
     /// Whether the gyros turn during these samples.

@@ -68,6 +68,15 @@ impl OfLog {
         self.open_with(path, |found| show_found(path, found))
     }
 
+    /// Reads several logs of one sensor, each of one position; `None` if it was turned in one.
+    pub fn open_positions(&self, paths: &[PathBuf]) -> anyhow::Result<Option<Vec<Opened>>> {
+        let (stream, stated) = self.stated()?;
+        let stated = (stream, &stated);
+        Ok(Opened::of_positions(paths, stated, |path, draft| {
+            show_found(path, &draft.found());
+        })?)
+    }
+
     /// Does the same as [`Self::open`], but passes the fields found in a log to `show`.
     pub fn open_with(&self, path: &Path, show: impl FnOnce(&[Found])) -> anyhow::Result<Opened> {
         let (stream, stated) = self.stated()?;

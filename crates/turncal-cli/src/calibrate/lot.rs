@@ -117,7 +117,7 @@ impl Calibrate {
         let problem = self.estimation.problem(&run, path)?;
         let solution = problem.solve(self.estimation.method, UNWATCHED)?;
         let mut checked = CheckedCalibration::new(&problem, solution)?;
-        record_inputs(&mut checked.calibration, path, &run);
+        record_inputs(&mut checked.calibration, [path], &run);
         let of = (&checked, &checked.consequences(&problem, None));
         let limits = self.specification.as_deref().map(models::specification);
         let limits = limits.transpose()?;

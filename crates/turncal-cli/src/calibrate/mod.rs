@@ -33,7 +33,7 @@ use turncal::models;
 use turncal::recording::Recording;
 use turncal::run::Run;
 use turncal::study::{CheckedCalibration, Shard};
-use turncal_files::{Campaign, Opened, record_inputs};
+use turncal_files::{Campaign, Opened, is_toml, record_inputs};
 use turncal_report as report;
 use turncal_report::calibration as of_calibration;
 use turncal_report::calibration::Truth;
@@ -55,7 +55,9 @@ const FOLLOWING: &str = "Following a log";
 /// A campaign.toml lists several recordings of one instrument. They are calibrated jointly: parameters may depend on
 /// temperature and differ from day to day.
 ///
-/// Several runs are the units of a lot: each is calibrated into DIR/units/NAME/, and DIR/lot.json, lot.csv and
+/// Several logs, in each of which a sensor lies still in one position, are one recording of that sensor.
+///
+/// Several run.toml (or, with --lot, logs) are the units of a lot: each is calibrated into DIR/units/NAME/, and DIR/lot.json, lot.csv and
 /// index.html summarise the lot. Units that fail are listed with the reason; the command then fails after writing
 /// everything. The same command, run again, processes only missing or changed units.
 #[derive(Debug, clap::Args)]
@@ -67,6 +69,7 @@ const FOLLOWING: &str = "Following a log";
   turncal calibrate my-run/run.toml --aiding velocity
   turncal calibrate my-run/run.toml --json | jq .gyro.scale
   turncal calibrate my-run/run.toml --temperature
+  turncal calibrate x_up.csv x_down.csv y_up.csv y_down.csv z_up.csv z_down.csv
   turncal calibrate campaign.toml -o mine
   turncal calibrate lot/*/run.toml -o lot-result \\
       --specification specification.toml
@@ -74,8 +77,8 @@ const FOLLOWING: &str = "Following a log";
   turncal calibrate --follow imu.csv --specification mems-by-hand
   turncal calibrate lot/*/run.toml --shard 3/8 -o part-3")]
 pub struct Calibrate {
-    /// A run.toml, a log, or - for text on standard input; several are units of a lot; a campaign.toml lists recordings
-    /// of one instrument
+    /// A run.toml, a log, or - for text on standard input; several logs of a sensor that lies still are one recording,
+    /// other runs are units of a lot; a campaign.toml lists recordings of one instrument
     #[arg(required = true, value_name = "RUN.toml|LOG", value_parser = run_or_log)]
     runs: Vec<PathBuf>,
     #[command(flatten)]
@@ -95,6 +98,9 @@ pub struct Calibrate {
     /// Parameters that must be determined; otherwise the exit status is 3
     #[arg(long, value_name = "PARAMETERS", value_parser = one_of(&REQUIRED), value_delimiter = ',', conflicts_with_all = ["specification", "shard"])]
     require: Vec<&'static str>,
+    /// Take each run as a unit of a lot, also logs of a sensor that lies still
+    #[arg(long, conflicts_with_all = ["follow", "truth", "temperature"])]
+    lot: bool,
     /// Limits for the units of a lot (a specification.toml)
     #[arg(long, value_name = "FILE", conflicts_with = "truth")]
     specification: Option<PathBuf>,
@@ -133,24 +139,64 @@ impl Calibrate {
             return self.followed();
         }
         match self.runs.as_slice() {
-            [file] if self.specification.is_none() && self.shard.is_none() => {
+            [file] if !self.is_of_lot() => {
                 if Campaign::is_at(file) {
                     self.campaign(file)
                 } else {
                     self.one(file)
                 }
             }
-            _ if self.truth.is_some() => {
-                let message = "--truth applies to one run; to compare units of a lot with their truths, use turncal \
-                    compare\n";
-                clap::Error::raw(ErrorKind::ArgumentConflict, message).exit();
-            }
-            _ if !self.require.is_empty() => {
-                let message = "--require applies to one run; for the units of a lot, give a --specification\n";
-                clap::Error::raw(ErrorKind::ArgumentConflict, message).exit();
-            }
-            _ => self.lot(),
+            [first, ..] if self.are_logs() && !self.is_of_lot() => self.positions(first),
+            _ => self.units(),
         }
+    }
+
+    /// Whether an option says that the runs are units of a lot.
+    fn is_of_lot(&self) -> bool {
+        self.lot || self.specification.is_some() || self.shard.is_some()
+    }
+
+    fn are_logs(&self) -> bool {
+        self.runs.iter().all(|run| !is_toml(run))
+    }
+
+    /// Several logs: of one sensor at rest, or else of the units of a lot.
+    fn positions(&self, first: &Path) -> anyhow::Result<()> {
+        let activity = Activity::new(format!("reading {}", first.display()));
+        let count = self.runs.len();
+        let Some(opened) = self.of_log.open_positions(&self.runs)? else {
+            drop(activity);
+            tell!(
+                "note: the sensor is turned in these {count} logs, so they are taken as units of a lot (--lot)"
+            );
+            return self.units();
+        };
+        tell!(
+            "note: the sensor lies still in each of these {count} logs, so they are taken as one recording of one \
+             sensor; for several sensors, add --lot"
+        );
+        let runs: Vec<&Run> = opened.iter().map(|opened| &opened.run).collect();
+        let together = Together {
+            temperature: None,
+            ..Together::default()
+        };
+        let problem = self.estimation.together(&runs, &together)?;
+        let whole = first.canonicalize().unwrap_or_else(|_| first.to_owned());
+        let directory = whole.parent().and_then(Path::file_name);
+        let name = directory.unwrap_or("positions".as_ref()).to_string_lossy();
+        self.solved(&problem, &name, (first, None), activity)
+    }
+
+    /// The units of a lot.
+    fn units(&self) -> anyhow::Result<()> {
+        let message = if self.truth.is_some() {
+            "--truth applies to one run; to compare units of a lot with their truths, use turncal compare\n"
+        } else if !self.require.is_empty() {
+            "--require applies to one run; for the units of a lot, give a --specification\n"
+        } else {
+            return self.lot();
+        };
+        clap::Error::raw(ErrorKind::ArgumentConflict, message).exit();
     }
 
     /// Follows a log until it ends, then calibrates it.
@@ -262,7 +308,12 @@ impl Calibrate {
             Method::Ekf => format!("{name}-calibration"),
             Method::SixPosition => format!("{name}-calibration-six-position"),
         });
-        let inputs = Vec::from_iter([Some(path), self.truth.as_deref()].into_iter().flatten());
+        let sources: Vec<&Path> = match self.runs.as_slice() {
+            [_] => vec![path],
+            several => several.iter().map(PathBuf::as_path).collect(),
+        };
+        let mut inputs = sources.clone();
+        inputs.extend(self.truth.as_deref());
         let begin = |target: &PathBuf| self.overwrite.directory(target, &inputs);
         let directory = target.as_ref().map(begin).transpose()?;
 
@@ -270,7 +321,7 @@ impl Calibrate {
         let solution = solve(problem, self.estimation.method, &activity)
             .inspect_err(|_| say(&run.recording))?;
         let mut checked = CheckedCalibration::new(problem, solution)?;
-        record_inputs(&mut checked.calibration, path, run);
+        record_inputs(&mut checked.calibration, sources, run);
         activity.next("writing");
         // JSON on standard output has no report.
         let document = (directory.is_some() || !self.json).then(|| {

@@ -90,7 +90,7 @@ impl Draft {
     /// Units that are neither known nor whole counts: perhaps a rate or unit that only turns and gravity can check is
     /// wrong.
     pub(crate) fn doubts(&self) -> impl Iterator<Item = String> + '_ {
-        Sensor::ALL.into_iter().filter_map(|sensor| {
+        let units = Sensor::ALL.into_iter().filter_map(|sensor| {
             let unit = self.quantities.units.get(sensor);
             let scale = unit.scale.as_ref().filter(|_| unit.is_unfit)?;
             let (name, why, found) = (sensor.name(), &unit.why, &scale.why);
@@ -98,11 +98,25 @@ impl Draft {
                 "The unit of the {name} rows is not clear: {why}. turncal estimated {found}. Check --rate, and state \
                  --{name}-unit."
             ))
-        })
+        });
+        let left_out = self.left_out.map(|_| {
+            "turncal left out the gyros, because their unit cannot be told: the sensor was not turned. For their \
+             biases, add --gyro-unit."
+                .to_owned()
+        });
+        units.chain(left_out)
     }
 
     fn time_found(&self) -> Found {
         let clock = &self.clock;
+        if self.of_means {
+            return Found::new(
+                "time",
+                "none",
+                Certainty::Guess,
+                "a row is the mean of a position",
+            );
+        }
         let name = self.columns.time.map(|k| self.columns.names[k].as_str());
         let hertz = |rate: f64| format!("{} Hz", rounded(rate, 4));
         let (value, certainty) = match (name, clock.period.map(f64::recip)) {
@@ -125,6 +139,11 @@ impl Draft {
     fn triad_found(&self, sensor: Sensor) -> Found {
         let what = sensor.pick("gyros", "accels");
         let unit = self.quantities.units.get(sensor);
+        if let Some(triad) = self.left_out.filter(|_| sensor == Sensor::Gyro) {
+            let names = triad.map(|k| self.columns.names[k].as_str()).join(" ");
+            let why = "the sensor was not turned; add --gyro-unit for their biases";
+            return Found::new(what, format!("{names}, left out"), Certainty::Unknown, why);
+        }
         let Some(triad) = self.columns.triads.get(sensor) else {
             return Found::new(what, "no columns", Certainty::Unknown, NO_COLUMNS);
         };

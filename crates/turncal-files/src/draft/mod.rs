@@ -56,6 +56,10 @@ pub struct Draft {
     blocked: Vec<String>,
     /// White noise in the quantity of the file per second, per √Hz, if the log has dwells.
     random_walk: PerSensor<Option<f64>>,
+    /// Gyro columns left out, because nothing shows their unit.
+    left_out: Option<[usize; 3]>,
+    /// Whether each row is the mean of a position.
+    of_means: bool,
     /// Motion in the rows, relative to the nominal register zero.
     motion: Option<Motion>,
     /// The accelerometer column with negative gravity at the start.
@@ -100,12 +104,71 @@ impl Draft {
         if let Some((streams, sheet)) = streams {
             return Ok(Self::of_sheet(sheet, Some(streams), stated));
         }
-        let sheet = Sheet::read(file, FEWEST_ROWS)?;
+        let sheet = Sheet::read(file, 1)?;
+        if sheet.rows() < FEWEST_ROWS {
+            return Self::of_means(file, sheet, stated);
+        }
         if columns::have_rows_of_their_own(&sheet) {
             let (streams, sheet) = Streams::of_two_files(file, file, None)?;
             return Ok(Self::of_sheet(sheet, Some(streams), stated));
         }
         Ok(Self::of_sheet(sheet, None, stated))
+    }
+
+    /// Examines a short table, whose rows are the means of positions.
+    fn of_means(file: &DataFile, sheet: Sheet, stated: &Stated) -> Result<Self, FileError> {
+        let found = format!("only {} rows", sheet.rows());
+        // A row lasts a second: what it is the mean of is not known.
+        let rate_hz = stated.rate_hz.or(Some(1.0));
+        let stated = Stated {
+            rate_hz,
+            ..stated.clone()
+        };
+        let mut draft = Self::of_sheet(sheet, None, &stated);
+        let columns = &mut draft.columns;
+        let PerSensor { gyro, accel } = columns.triads;
+        if accel.is_none() || gyro.is_some() || columns.time.is_some() {
+            let expected = format!("at least {FEWEST_ROWS}, or the means of some positions");
+            let advice = "Record a run with dwells and turns, or give a table of accelerometer means, a row a position.";
+            return Err(FileError::of(file, found, expected, advice));
+        }
+        draft.of_means = true;
+        Ok(draft)
+    }
+
+    /// Whether the gravity direction stays the same, as in the log of one position.
+    pub fn is_of_one_position(&self) -> bool {
+        let stays = |motion: &Motion| !motion.is_turned && motion.cuts.is_empty();
+        self.motion.as_ref().is_some_and(stays)
+    }
+
+    /// Takes the units of another log of the same sensor.
+    ///
+    /// # Errors
+    /// [`FileError`] if the columns are not those of the other log.
+    pub fn as_in(&mut self, file: &Path, other: &Self) -> Result<(), FileError> {
+        let names = |of: &Self| of.columns.names.join(", ");
+        if self.columns.names != other.columns.names {
+            let advice = "Give the logs of one sensor, or add --lot for several sensors.";
+            return Err(FileError::of(
+                file,
+                format!("the columns {}", names(self)),
+                names(other),
+                advice,
+            ));
+        }
+        self.quantities = other.quantities.clone();
+        self.offset = other.offset;
+        self.leave_out_gyros();
+        Ok(())
+    }
+
+    /// Leaves out gyros whose unit nothing shows: gravity alone calibrates the accelerometers.
+    pub fn leave_out_gyros(&mut self) {
+        let knows = |sensor| self.quantities.units.get(sensor).word.is_some();
+        if !knows(Sensor::Gyro) && knows(Sensor::Accel) && self.columns.triads.accel.is_some() {
+            self.left_out = self.columns.triads.gyro.take();
+        }
     }
 
     /// Examines two files of rows, one of gyros and one of accelerometers. `accel_name` is the name of the second file
@@ -161,6 +224,8 @@ impl Draft {
             offset: PerSensor::default(),
             blocked: Vec::new(),
             random_walk: PerSensor::default(),
+            left_out: None,
+            of_means: false,
             motion: None,
             only,
             contradiction,
@@ -196,7 +261,11 @@ impl Draft {
         self.quantities.state(&self.stated);
         self.random_walk = self.noise_at_rest(rows, &motion).unwrap_or_default();
         self.offset = rows.offset;
+        let is_joined = motion.stands && !motion.cuts.is_empty();
         self.motion = Some(motion);
+        if is_joined {
+            self.leave_out_gyros();
+        }
     }
 
     /// Whether the triads are swapped: gravity is in the columns named as gyros, its rotation in those named as

@@ -22,6 +22,8 @@ const BESIDE: usize = 8;
 const CUT: f64 = 30.0 * DEGREE;
 /// The gravity direction varies by less than this on each side of a cut, rad.
 const STEADY: f64 = 5.0 * DEGREE;
+/// Most windows that a jump, or an end of the rows, disturbs: its own and the neighbours.
+const AT_CUT: usize = 3;
 /// Step of the integration of the gravity direction, s.
 pub const FOLLOWED: f64 = 0.08;
 /// Specific force gives the direction of gravity if its magnitude is within this fraction of gravity.
@@ -42,6 +44,8 @@ pub struct Motion {
     pub rest: Vector3<f64>,
     /// Whether the gravity direction changes.
     pub is_turned: bool,
+    /// Whether nothing moves but at these jumps.
+    pub stands: bool,
     /// Angle in rad per gyro unit in one row, if determined by turns; negative if the triads have opposite signs.
     pub angle: Option<f64>,
     /// Samples before which the gravity direction jumps, as in concatenated sections.
@@ -103,6 +107,7 @@ impl Motion {
             gravity: median(&mut sizes).unwrap_or(usual),
             rest,
             is_turned: is_turned(&accel, usual),
+            stands: at_rest.iter().filter(|rest| !**rest).count() <= AT_CUT * (cuts.len() + 1),
             angle: angle.filter(|_| cuts.is_empty()),
             cuts,
             sum_variance: sum_variance(samples, &settled),

@@ -88,7 +88,7 @@ impl Draft {
             accel_unit: self.unit(Sensor::Accel, remarks),
             time_unit: (clock.unit != "s").then(|| TimeUnitField::of_text(&clock.unit)),
             time_stamp: TimeStamp::End,
-            continuous: Some(self.cuts() == 0),
+            continuous: Some(self.cuts() == 0 && !self.of_means),
             body_axes: Some(self.body_axes(remarks)),
             instance: self.instance.map(|(column, number)| InstanceFile {
                 column: self.name(column),
@@ -163,6 +163,9 @@ impl Draft {
 
     fn why_continuous(&self) -> String {
         let clock = &self.clock;
+        if self.of_means {
+            return "each row is the mean of a position".to_owned();
+        }
         match (self.cuts(), clock.gaps.len(), clock.repeated) {
             (0, 0, 0) => "no gaps".to_owned(),
             (0, 0, repeated) => {
@@ -235,7 +238,10 @@ impl Draft {
                 (Some(_), _) => {}
                 (None, None) => remarks.open_before(path, why()),
                 (None, Some(_)) => {
-                    let without = "without them only `turncal allan` can use the log";
+                    let without = sensor.pick(
+                        "without them only the accelerometers can be calibrated",
+                        "without them only `turncal allan` can use the log",
+                    );
                     remarks.before(path, format_args!("{}; {without}", why()));
                 }
             }

@@ -5,13 +5,10 @@ use super::parts::Parts;
 use super::settings::{ImuLog, Layout};
 use crate::temperature::Temperatures;
 use turncal::imu::Output;
-use turncal::recording::ImuSamples;
+use turncal::recording::{FEWEST_SAMPLES, ImuSamples};
 use turncal_input::{FileError, counted};
 use turncal_logs::clock::{Stamp, Stamps, Wander};
 use turncal_logs::rows::LogRows;
-
-/// Minimum number of samples; with fewer, dwells and turns cannot be distinguished.
-const FEWEST_SAMPLES: usize = 100;
 
 /// A partly read file.
 pub struct Reading<'a> {
@@ -117,6 +114,12 @@ impl<'a> Reading<'a> {
         [blank, lacking].into_iter().flatten()
     }
 
+    /// Fewest samples of a recording, or of a table of means.
+    fn fewest(&self) -> usize {
+        let may_be_means = !self.log.continuous && self.log.clock_of_rows().column.is_none();
+        if may_be_means { 1 } else { FEWEST_SAMPLES }
+    }
+
     fn too_few(&self, csv: &LogRows) -> FileError {
         let (found, advice) = match self.lacking {
             0 => (String::new(), "Record a run with dwells and turns."),
@@ -164,7 +167,7 @@ impl<'a> Reading<'a> {
         }
         let mut parts = match parts {
             Some(parts) => parts,
-            None if self.held.len() < FEWEST_SAMPLES => return Err(self.too_few(csv)),
+            None if self.held.len() < self.fewest() => return Err(self.too_few(csv)),
             None => begin(self, csv, None)?,
         };
         let taken = parts.take(&mut self.held, &mut self.stamps, true);

@@ -17,9 +17,12 @@ use turncal::imu::{Instrument, NoiseKeys, Output, PerSensor, Sensor};
 use turncal::noise;
 use turncal::recording::{ImuSamples, Recording, faults, nanoseconds};
 use turncal::run::{Run, SET_BY_HAND, Standstill};
-use turncal::units::{ARCSEC, DEGREE, MILLIGAL, PPM};
+use turncal::units::{ARCSEC, DEGREE, MICRO_G_PER_SQRT_HZ, MILLIGAL, PPM};
 use turncal_input::{Document, FileError, small_file, stated_gravity_sigma};
 use turncal_logs::DataFile;
+
+/// White noise of means of positions, averaged for unknown times: that of a MEMS sensor in a second, (m/s)/√s.
+const NOISE_OF_MEANS: f64 = 300.0 * MICRO_G_PER_SQRT_HZ;
 
 /// Reads `run.toml` and the files given in it, relative to itself.
 ///
@@ -166,13 +169,24 @@ impl InstrumentFields<'_> {
         let mut found = Vec::new();
         for sensor in Sensor::ALL {
             if !known.noise_is_stated.get(sensor) && imu.has(sensor) {
-                let random_walk = noise::white_noise(imu, sensor);
+                let random_walk = if imu.is_of_means() {
+                    NOISE_OF_MEANS
+                } else {
+                    noise::white_noise(imu, sensor)
+                };
                 known.noise.get_mut(sensor).random_walk = random_walk;
                 let (key, unit) = NoiseKeys::of(sensor).random_walk;
                 found.push(format!("{key} = {:.3}", random_walk / unit));
             }
         }
-        if !found.is_empty() {
+        if imu.is_of_means() {
+            notes.push(format!(
+                "The rows are the means of {} positions, and their noise is not known. turncal assumed {}, that of a \
+                 second of a MEMS sensor. State velocity_random_walk_ug_per_sqrt_hz for rows of one second if you know it.",
+                imu.len(),
+                found.join(", ")
+            ));
+        } else if !found.is_empty() {
             notes.push(format!(
                 "You stated no white noise. turncal starts from the noise of the quieter part of the recording ({}) \
                  and estimates it from there. If you know the data-sheet values, state them in [imu.noise].",

@@ -103,6 +103,8 @@ impl Report<'_> {
     /// Methods and data.
     fn lead(&self) -> Vec<String> {
         let imu = &self.run.recording.imu;
+        let origin = self.calibration.provenance.as_ref();
+        let duration = origin.map_or(imu.duration(), |origin| origin.duration_s);
         let how = match self.table() {
             Some(_) => "with a table",
             None => "without a table",
@@ -112,7 +114,7 @@ impl Report<'_> {
             match self.outcome.map_or(0, |outcome| outcome.alone.len()) {
                 0 | 1 => format!(
                     "{} s at {} Hz, {dwells}, {how}",
-                    value(imu.duration(), 10.0),
+                    value(duration, 10.0),
                     three_digits(1.0 / imu.period),
                 ),
                 recordings => format!("{recordings} recordings of one instrument, {dwells}, {how}"),

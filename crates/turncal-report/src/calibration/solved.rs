@@ -81,6 +81,7 @@ pub fn note(closed_form: &ClosedForm) -> String {
         Reference::Gravity => {
             format!("gravity in {accel} dwells and its direction change over {turns} turns")
         }
+        Reference::GravityAlone => format!("the magnitude of gravity in {accel} dwells"),
     };
     let minutes = closed_form.standing_time / 60.0;
     let digits = usize::from(minutes < 10.0);

@@ -4,7 +4,7 @@
 //! Each statement competes with alternatives, weighted by the likelihood of the motion, as for axes. A different gyro
 //! sensitivity is searched only if the gyros miss a turn.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::contradiction::Contradiction;
 use super::likelihood::TooSmall;
@@ -55,6 +55,9 @@ impl Contradiction {
             } else {
                 Self::Sensitivity(Sensitivity::of(run, Sensor::Accel, axes, vec![factor]))
             });
+        }
+        if !run.recording.imu.has(Sensor::Gyro) {
+            return None;
         }
         let mounting = Mounting::likeliest(problem, run, &measured);
         let misses = measured.misses_a_turn(WIDEST_TOLERANCE / 2.0);
@@ -111,8 +114,8 @@ pub fn is_beyond_tolerance(factor: f64, sigma: f64) -> bool {
 
 /// The accelerometers whose specific force at rest does not match gravity, with the ratio.
 ///
-/// If the attitudes separate the axes, `Σ (f_i / s_i)² = 1` over all dwells gives the sensitivity of each; otherwise
-/// the magnitude gives that of the triad.
+/// If the attitudes separate the axes, the ellipsoid of all dwells gives the sensitivity of each, beside its bias;
+/// otherwise the magnitude gives that of the triad.
 fn by_magnitude(run: &Run, motion: &Motion) -> Option<(Axes, f64)> {
     let mut forces: Vec<Vector3<f64>> = motion.rests.iter().map(|rest| rest.accel.found).collect();
     if forces.is_empty() {
@@ -121,29 +124,50 @@ fn by_magnitude(run: &Run, motion: &Motion) -> Option<(Axes, f64)> {
         forces = rates.map(|force| force / run.site.gravity).collect();
     }
     let is_another = |factor: &f64| is_another(run, Sensor::Accel, *factor);
-    let squares = forces.iter().map(|force| force.component_mul(force));
-    let (normal, right) = squares.clone().fold(
-        (Matrix3::zeros(), Vector3::zeros()),
-        |(normal, right), of| (normal + of * of.transpose(), right + of),
-    );
-    // With each axis up and down in some dwell, all eigenvalues are of similar size.
-    let eigen = normal.symmetric_eigenvalues();
-    let of_axes = (eigen.min() > eigen.max() / WIDEST)
-        .then(|| normal.cholesky())
-        .flatten()
-        .map(|normal| {
-            normal
-                .solve(&right)
-                .map(|square| square.max(f64::MIN_POSITIVE).sqrt().recip())
-        });
-    if let Some(each) = of_axes {
+    let ellipsoid = ellipsoid(&forces, 6).or_else(|| ellipsoid(&forces, 3));
+    if let Some((centre, each)) = ellipsoid {
         let others: Vec<usize> = (0..3).filter(|&axis| is_another(&each[axis])).collect();
         if let [axis] = others[..] {
             return Some((Axes::One(axis), each[axis]));
         }
+        forces.iter_mut().for_each(|force| *force -= centre);
     }
     let magnitude = median(&mut forces.iter().map(Vector3::norm).collect::<Vec<_>>())?;
     is_another(&magnitude).then_some((Axes::All, magnitude))
+}
+
+/// Smallest eigenvalue of the correlations of the unknowns of an ellipsoid. Forces that are known to a thousandth give
+/// its axes to a few hundredths, and a different sensitivity is a tenth or more.
+const TOLD: f64 = 1e-3;
+
+/// Centre and half axes of the ellipsoid `Σ a_i f_i² + b_i f_i = 1` through forces, with `b` (six unknowns) or about
+/// zero (three); `None` if they do not show it.
+fn ellipsoid(forces: &[Vector3<f64>], unknowns: usize) -> Option<(Vector3<f64>, Vector3<f64>)> {
+    let entry = |row: usize, k: usize| forces[row][k % 3].powi(if k < 3 { 2 } else { 1 });
+    let mut design = DMatrix::from_fn(forces.len(), unknowns, entry);
+    let sizes: Vec<f64> = design
+        .column_iter_mut()
+        .map(|mut column| column.normalize_mut())
+        .collect();
+    let correlations = design.tr_mul(&design);
+    if !correlations.iter().all(|of| of.is_finite()) {
+        return None;
+    }
+    let is_told = correlations.symmetric_eigenvalues().min() > TOLD;
+    let right = design.tr_mul(&DVector::repeat(forces.len(), 1.0));
+    let found = correlations.cholesky().filter(|_| is_told)?.solve(&right);
+    let found: Vec<f64> = found
+        .iter()
+        .zip(sizes)
+        .map(|(of, size)| of / size)
+        .collect();
+    let squares = Vector3::from_column_slice(&found[..3]);
+    if squares.min() <= 0.0 {
+        return None;
+    }
+    let centre = Vector3::from_fn(|k, _| found.get(k + 3).map_or(0.0, |b| -b / (2.0 * squares[k])));
+    let beyond = 1.0 + centre.component_mul(&centre).dot(&squares);
+    Some((centre, squares.map(|a| (beyond / a).sqrt())))
 }
 
 /// The most likely factor, and others that are hardly less likely and distinct.
