@@ -60,14 +60,6 @@ struct Hypothesis {
     order: Order,
     /// Logarithm of the likelihood relative to triads that are not related.
     likelihood: f64,
-    /// Remaining fraction of the square of the changes.
-    rest: f64,
-}
-
-impl Hypothesis {
-    fn is_shown(&self, limit: f64) -> bool {
-        self.likelihood > limit && self.rest < GOOD
-    }
 }
 
 pub fn overlap(a: &Triad, b: &Triad) -> bool {
@@ -80,130 +72,114 @@ impl Identified {
         let rows = columns.first().map_or(0, Vec::len);
         let lengths = (0..).map(|power| 1 << power);
         let lengths = lengths.take_while(|length| length * FEWEST_WINDOWS <= rows);
+        let likeliest = |all: &Vec<Hypothesis>| {
+            let all = all.iter().map(|of| of.likelihood);
+            all.fold(f64::NEG_INFINITY, f64::max)
+        };
         let all = lengths
             .map(|length| hypotheses(&Windows::new(columns, candidates, length), candidates));
-        let best = |all: &Vec<Hypothesis>| {
-            let shown = all.iter().filter(|of| of.rest < GOOD);
-            shown
-                .map(|of| of.likelihood)
-                .fold(f64::NEG_INFINITY, f64::max)
+        let all = all.max_by(|a, b| likeliest(a).total_cmp(&likeliest(b)));
+        let by_turns = Self::by_turns(columns, &all.unwrap_or_default());
+        by_turns.unwrap_or_else(|| Self::by_magnitude(columns, candidates))
+    }
+
+    /// The likeliest triads, in the order of the columns unless another is likelier beyond doubt.
+    fn by_turns(columns: &[Vec<f64>], all: &[Hypothesis]) -> Option<Self> {
+        let limit = FALSE_ALARM.recip().ln();
+        let likeliest = |is: &dyn Fn(&&Hypothesis) -> bool| {
+            // Of equal ones the first.
+            let all = all.iter().rev().filter(is);
+            all.max_by(|a, b| a.likelihood.total_cmp(&b.likelihood))
         };
-        let all = all.max_by(|a, b| best(a).total_cmp(&best(b)));
-        let by_turns = all.and_then(|all| by_turns(columns, &all));
-        by_turns.unwrap_or_else(|| by_magnitude(columns, candidates))
+        let best = likeliest(&|_| true).filter(|of| of.likelihood > limit)?;
+        let plain = likeliest(&|of| of.order.is_plain());
+        let best = plain
+            .filter(|of| of.likelihood > limit.max(best.likelihood - limit))
+            .unwrap_or(best);
+        let same = |a: &Triad, b: &Triad| a == b || are_copies(columns, a, b);
+        let with = |sensor: Sensor| {
+            let all = all
+                .iter()
+                .filter(|of| of.order == best.order && of.likelihood > limit);
+            let mut triads: Vec<Triad> = all.map(|of| *of.of.get(sensor)).collect();
+            triads.sort_unstable();
+            triads.dedup();
+            triads
+        };
+        let (mut gyro, mut accel) = (with(Sensor::Gyro), with(Sensor::Accel));
+        gyro.retain(|of| same(of, &best.of.gyro));
+        // A compass turns as gravity does.
+        accel.retain(|of| same(of, &best.of.accel) || !overlap(of, &best.of.accel));
+        accel.sort_by_cached_key(|of| !is_gravity(columns, of));
+        let is_field = |of: &&Triad| {
+            !same(of, &accel[0]) && is_gravity(columns, of) == is_gravity(columns, &accel[0])
+        };
+        let compass = accel.iter().find(is_field);
+        let compass = compass.map(|&accel| PerSensor {
+            gyro: gyro[0],
+            accel,
+        });
+        let is_best = |of: &&Hypothesis| of.order == best.order && same(&of.of.accel, &accel[0]);
+        let chosen = likeliest(&is_best).unwrap_or(best);
+        let is_rival = |of: &&Hypothesis| {
+            let is_other = of.order != best.order
+                || !same(&of.of.gyro, &gyro[0])
+                || !same(&of.of.accel, &accel[0]);
+            let is_near = of.likelihood > chosen.likelihood - limit;
+            is_near && is_other && (of.of.accel == accel[0] || overlap(&of.of.accel, &accel[0]))
+        };
+        let rival = all.iter().find(is_rival).map(|of| of.of);
+        let order = (!best.order.is_plain()).then(|| Doubt::Order(best.order.of(&gyro[0])));
+        let doubt = order.or(rival.or(compass).map(Doubt::Rival));
+        Some(Self {
+            triads: PerSensor { gyro, accel },
+            doubt,
+        })
+    }
+
+    /// The triads of a record without turns: of accelerometers the magnitude is most constant, of gyros least.
+    fn by_magnitude(columns: &[Vec<f64>], candidates: &PerSensor<Vec<Triad>>) -> Self {
+        let sorted = |sensor: Sensor| {
+            let mut apart: Vec<Triad> = Vec::new();
+            for triad in candidates.get(sensor) {
+                let is_apart = apart.iter().all(|other| !overlap(triad, other));
+                apart.extend(is_apart.then_some(triad));
+            }
+            apart.sort_by(|a, b| uneven(columns, a).total_cmp(&uneven(columns, b)));
+            apart
+        };
+        let (mut gyro, mut accel) = (sorted(Sensor::Gyro), sorted(Sensor::Accel));
+        let is_lone = gyro.len() == 1 && accel == gyro;
+        accel.retain(|triad| !is_lone || !is_uneven(columns, triad));
+        accel.truncate(1);
+        gyro.retain(|triad| accel.iter().all(|accel| !overlap(triad, accel)));
+        gyro.reverse();
+        let doubt = Some(Doubt::NoTurns);
+        Self {
+            triads: PerSensor { gyro, accel },
+            doubt,
+        }
     }
 }
 
+/// Pairs of candidates with all orders of the gyro axes whose turns explain most of the changes.
 fn hypotheses(windows: &Windows, candidates: &PerSensor<Vec<Triad>>) -> Vec<Hypothesis> {
-    let pairs = candidates.accel.iter();
-    let pairs = pairs.flat_map(|accel| candidates.gyro.iter().map(move |gyro| (*gyro, *accel)));
-    let pairs = pairs.filter(|(gyro, accel)| !overlap(gyro, accel));
-    let of_pair = |(gyro, accel): (Triad, Triad)| {
-        let moments = Moments::new(&windows.means, &windows.moving, gyro, accel);
-        let of_order = move |order: Order| {
-            let ratios = moments.as_ref()?.ratios(&order)?;
-            let logarithms = ratios.of_axes.iter().map(|ratio| ratio.ln());
-            Some(Hypothesis {
+    let mut all = Vec::new();
+    for &accel in &candidates.accel {
+        for &gyro in candidates.gyro.iter().filter(|gyro| !overlap(gyro, &accel)) {
+            let moments = Moments::new(&windows.means, &windows.moving, gyro, accel);
+            let ratios = |order: Order| Some((order, moments.as_ref()?.ratios(&order)?));
+            let shown = Order::all()
+                .filter_map(ratios)
+                .filter(|(_, ratios)| ratios.of_all < GOOD);
+            all.extend(shown.map(|(order, ratios)| Hypothesis {
                 of: PerSensor { gyro, accel },
                 order,
-                likelihood: -0.5 * windows.count * logarithms.sum::<f64>(),
-                rest: ratios.of_all,
-            })
-        };
-        Order::all().filter_map(of_order).collect::<Vec<_>>()
-    };
-    pairs.flat_map(of_pair).collect()
-}
-
-/// The triads that turns show beyond doubt against unrelated triads.
-fn by_turns(columns: &[Vec<f64>], all: &[Hypothesis]) -> Option<Identified> {
-    let limit = FALSE_ALARM.recip().ln();
-    let likeliest = |is: &dyn Fn(&&Hypothesis) -> bool| {
-        let of = all.iter().filter(|of| of.is_shown(limit)).filter(is);
-        // Of equal ones the first.
-        of.rev()
-            .max_by(|a, b| a.likelihood.total_cmp(&b.likelihood))
-    };
-    let best = likeliest(&|_| true)?;
-    let is_plain = |of: &&Hypothesis| of.order.is_plain();
-    let plain = likeliest(&is_plain).filter(|of| of.likelihood > best.likelihood - limit);
-    let best = plain.unwrap_or(best);
-    let same = |a: &Triad, b: &Triad| a == b || are_copies(columns, a, b);
-    let is_same = |of: &Hypothesis, sensor: Sensor| same(of.of.get(sensor), best.of.get(sensor));
-    // A compass turns as gravity does.
-    let fields = all.iter().filter(|of| {
-        let is_other = !overlap(&of.of.accel, &best.of.accel) && !is_same(of, Sensor::Accel);
-        is_other && of.order == best.order && of.is_shown(limit) && is_same(of, Sensor::Gyro)
-    });
-    let fields = fields.map(|of| of.of.accel).chain([best.of.accel]);
-    let mut fields: Vec<Triad> = fields.collect();
-    fields.sort_unstable();
-    fields.dedup();
-    fields.sort_by_key(|triad| !is_gravity(columns, triad));
-    let told = fields
-        .iter()
-        .filter(|triad| is_gravity(columns, triad))
-        .count();
-    let is_rival = |of: &&Hypothesis| {
-        let is_other = !Sensor::ALL.iter().all(|&sensor| is_same(of, sensor));
-        let is_other = is_other || of.order != best.order;
-        is_other && of.likelihood > best.likelihood - limit
-    };
-    let rival = all.iter().find(is_rival).map(|of| of.of);
-    let compass = fields.get(1).filter(|_| told != 1);
-    let compass = compass.map(|&accel| PerSensor {
-        accel,
-        gyro: best.of.gyro,
-    });
-    let order = best.order.of(&best.of.gyro);
-    let doubt = (!best.order.is_plain()).then_some(Doubt::Order(order));
-    let doubt = doubt.or(rival.or(compass).map(Doubt::Rival));
-    let copies = |sensor: Sensor| {
-        let of = all
-            .iter()
-            .filter(|of| of.order == best.order && of.is_shown(limit));
-        let mut of: Vec<Triad> = of.map(|of| *of.of.get(sensor)).collect();
-        of.retain(|of| same(of, best.of.get(sensor)));
-        of.sort_unstable();
-        of.dedup();
-        of
-    };
-    let accel = fields.first().filter(|field| !same(field, &best.of.accel));
-    let accel = accel.map_or_else(|| copies(Sensor::Accel), |field| vec![*field]);
-    let triads = PerSensor {
-        gyro: copies(Sensor::Gyro),
-        accel,
-    };
-    Some(Identified { triads, doubt })
-}
-
-/// The triads of a record without turns: of accelerometers the magnitude is most constant, of gyros least.
-fn by_magnitude(columns: &[Vec<f64>], candidates: &PerSensor<Vec<Triad>>) -> Identified {
-    let apart = |sensor| {
-        let mut apart: Vec<Triad> = Vec::new();
-        for triad in candidates.get(sensor) {
-            if apart.iter().all(|other| !overlap(triad, other)) {
-                apart.push(*triad);
-            }
+                likelihood: -0.5 * windows.count * ratios.of_axes.map(f64::ln).iter().sum::<f64>(),
+            }));
         }
-        apart
-    };
-    let scatter = |triad: &Triad| uneven(columns, triad);
-    let mut accels = apart(Sensor::Accel);
-    let mut gyros = apart(Sensor::Gyro);
-    accels.sort_by(|a, b| scatter(a).total_cmp(&scatter(b)));
-    let is_lone = gyros.len() == 1 && accels.first() == gyros.first();
-    accels.retain(|triad| !is_lone || scatter(triad) < UNEVEN);
-    accels.truncate(1);
-    gyros.retain(|triad| accels.iter().all(|accel| !overlap(triad, accel)));
-    gyros.sort_by(|a, b| scatter(b).total_cmp(&scatter(a)));
-    Identified {
-        triads: PerSensor {
-            gyro: gyros,
-            accel: accels,
-        },
-        doubt: Some(Doubt::NoTurns),
     }
+    all
 }
 
 fn magnitudes(columns: &[Vec<f64>], triad: &Triad) -> Vec<f64> {
@@ -298,17 +274,18 @@ impl Windows {
         });
         let means: Vec<Vec<f64>> = means.collect();
         let count = means.iter().map(Vec::len).max().unwrap_or(0);
-        let mut sizes = vec![(0.0, 0); count.saturating_sub(1)];
-        for column in means.iter().filter(|column| column.len() == count) {
-            let changes = column.windows(2).map(|pair| (pair[1] - pair[0]).powi(2));
-            let changes: Vec<f64> = changes.collect();
-            let whole = changes.iter().filter(|of| of.is_finite()).sum::<f64>();
-            for (place, (size, change)) in sizes.iter_mut().zip(changes).enumerate() {
-                let part = change / whole;
-                size.0 += if part.is_finite() { part } else { 0.0 };
-                size.1 = place;
-            }
-        }
+        let change = |column: &[f64], at: usize| (column[at + 1] - column[at]).powi(2);
+        let whole = |column: &Vec<f64>| {
+            let changes = (0..column.len().saturating_sub(1)).map(|at| change(column, at));
+            changes.filter(|of| of.is_finite()).sum::<f64>()
+        };
+        let wholes: Vec<f64> = means.iter().map(whole).collect();
+        let size = |at: usize| {
+            let known = means.iter().zip(&wholes).filter(|(_, whole)| **whole > 0.0);
+            let parts = known.map(|(column, whole)| change(column, at) / whole);
+            (parts.filter(|part| part.is_finite()).sum::<f64>(), at)
+        };
+        let mut sizes: Vec<(f64, usize)> = (0..count.saturating_sub(1)).map(size).collect();
         sizes.sort_by(|a, b| b.0.total_cmp(&a.0));
         sizes.truncate(MOST_WINDOWS);
         let sum = sizes.iter().map(|of| of.0).sum::<f64>();
