@@ -543,3 +543,88 @@ fn words_name_columns_and_units() {
         );
     }
 }
+
+/// Columns without names: gravity keeps its magnitude, and the gyros turn it.
+#[test]
+fn columns_without_names_are_identified_by_gravity_and_its_turns() {
+    let imu = |k: usize| format!("davis/left/imu[{k}]");
+    for (case, name, [gyro, accel]) in [
+        (
+            "c13-kitti-oxts",
+            "oxts.txt",
+            [18, 12].map(|k| [k, k + 1, k + 2].map(|k| k.to_string())),
+        ),
+        (
+            "c15-blackbox-units",
+            "units.csv",
+            [
+                [0, 1, 2].map(|k| format!("gyroADC[{k}] (deg/s)")),
+                [0, 1, 2].map(|k| format!("accSmooth[{k}] (m/s/s)")),
+            ],
+        ),
+        (
+            "c22-hdf5-six-columns",
+            "data.hdf5",
+            [[3, 4, 5].map(imu), [0, 1, 2].map(imu)],
+        ),
+        (
+            "c27-big-offset",
+            "imu.txt",
+            [5, 2].map(|k| [k, k + 1, k + 2].map(|k| k.to_string())),
+        ),
+    ] {
+        let Some(log) = file(case, name) else {
+            continue;
+        };
+        let text = draft(&log);
+        let columns = format!("gyro = {gyro:?}, accel = {accel:?}");
+        assert!(text.contains(&columns), "no `{columns}` in\n{text}");
+    }
+}
+
+#[test]
+fn two_files_without_names_may_be_given_in_any_order() {
+    let case = "c17-two-bare-files";
+    let Some((accel, gyro)) = file(case, "accelerometer.csv").zip(file(case, "gyro.csv")) else {
+        return;
+    };
+    let place = tempfile::tempdir().unwrap();
+    for names in ["", "t,x,y,z\n"] {
+        for (name, from) in [("a.csv", &accel), ("b.csv", &gyro)] {
+            let rows = fs::read_to_string(from).unwrap();
+            fs::write(place.path().join(name), format!("{names}{rows}")).unwrap();
+        }
+        for order in [["a.csv", "b.csv"], ["b.csv", "a.csv"]] {
+            let mut command = Command::new(env!("CARGO_BIN_EXE_turncal"));
+            let output = command
+                .current_dir(&place)
+                .arg("init")
+                .args(order)
+                .output()
+                .unwrap();
+            let text = String::from_utf8_lossy(&output.stdout);
+            has(
+                &text,
+                &[
+                    "file = \"b.csv\"",
+                    "accel_from = { file = \"a.csv\"",
+                    "gyro_unit = \"rad/s\"",
+                ],
+            );
+        }
+    }
+}
+
+#[test]
+fn objects_of_matlab_are_refused_with_the_command_that_writes_their_rows() {
+    let Some(log) = file("c21-matlab-mobile-object-real", "axis.mat") else {
+        return;
+    };
+    let message = Draft::of_file(&log).unwrap_err().to_string();
+    let command =
+        "writetimetable(synchronize(Acceleration, Orientation, AngularVelocity), 'imu.csv')";
+    assert!(
+        message.contains("`Acceleration` (timetable)") && message.contains(command),
+        "{message}"
+    );
+}

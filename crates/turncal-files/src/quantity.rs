@@ -32,7 +32,7 @@ const UNITS: [Row; 22] = [
     ("deg/s", Rows(Gyro, Rate), 1.0 / DEGREE, &["deg/s", "degs-1", "degs", "degps", "degpersec"]),
     ("deg/h", Rows(Gyro, Rate), 1.0 / DEG_PER_H, &["deg/h", "dph"]),
     ("mdps", Rows(Gyro, Rate), 1e3 / DEGREE, &["mdeg/s"]),
-    ("m/s^2", Rows(Accel, Rate), 1.0, &["m/s2", "ms-2", "mps2", "ms2"]),
+    ("m/s^2", Rows(Accel, Rate), 1.0, &["m/s2", "m/s/s", "ms-2", "mps2", "ms2"]),
     ("g", Rows(Accel, Rate), 1.0 / STANDARD_GRAVITY, &["g"]),
     ("mg", Rows(Accel, Rate), 1e3 / STANDARD_GRAVITY, &["mg"]),
     ("rad", Rows(Gyro, Increment), 1.0, &["rad"]),

@@ -3,11 +3,11 @@
 use nalgebra::Vector3;
 
 use super::name::Name;
-use super::raw_samples::offset;
 use super::stated::StatedColumns;
+use super::triads::{Doubt, Identified, Triad, consecutive, is_uneven, overlap};
 use crate::Sheet;
+use crate::quantity::Of;
 use turncal::imu::{PerSensor, Sensor};
-use turncal::statistics::median;
 
 /// Columns by index in the file.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,6 +21,8 @@ pub struct Columns {
     pub others: PerSensor<Vec<[usize; 3]>>,
     /// Whether the triads were identified by value, because their names are not informative.
     pub by_size: bool,
+    /// Why the triads that were identified by value are a guess.
+    pub doubt: Option<Doubt>,
     pub temperature: Option<usize>,
     /// Four columns with a norm of one.
     pub quaternion: Option<[usize; 4]>,
@@ -35,12 +37,6 @@ const MOST_INSTANCES: usize = 8;
 /// Fraction of increasing steps in a time column, and in a column with the name of a time, where values may repeat.
 const FORWARD: f64 = 0.9;
 const SELDOM_FORWARD: f64 = 0.01;
-/// Accelerometers have the magnitude of gravity within this fraction in half of the rows …
-const EVEN: f64 = 0.05;
-/// … and a column that deviates more from its median is not an accelerometer.
-const UNEVEN: f64 = 0.2;
-/// Gyros in a turn exceed their median by more than this factor.
-const LIVELY: f64 = 3.0;
 
 /// Samples of both triads, row by row.
 type Samples = PerSensor<Vec<Vector3<f64>>>;
@@ -57,8 +53,8 @@ impl Columns {
         let is_bare =
             |triad: &[usize; 3]| names[triad[0]].unit.is_none_or(|unit| unit.word == "count");
         found.gyro.sort_by_key(is_bare);
-        let rank = |triad: &[usize; 3]| (magnitude(sheet, triad).0 > UNEVEN, is_bare(triad));
-        found.accel.sort_by_key(rank);
+        let rank = |triad: &Triad| (is_uneven(&sheet.columns, triad), is_bare(triad));
+        found.accel.sort_by_cached_key(rank);
         let of_triads = found.gyro.iter().chain(&found.accel).flatten();
         let of_triads: Vec<usize> = of_triads.copied().collect();
         // Rows of another sensor may have other times.
@@ -72,12 +68,18 @@ impl Columns {
         let temperature = (0..names.len()).find(is_temperature);
         let quaternion = quaternion(sheet, time);
         let by_name = PerSensor::from_fn(|sensor| found.get(sensor).len());
+        let mut doubt = None;
         if by_name.gyro == 0 || by_name.accel == 0 {
             let taken = [time, nanoseconds, temperature].into_iter().flatten();
             let taken = taken
                 .chain(of_triads)
                 .chain(quaternion.into_iter().flatten());
-            by_numbers(sheet, &names, &taken.collect::<Vec<_>>(), &mut found);
+            let taken: Vec<usize> = taken.collect();
+            let Identified {
+                triads,
+                doubt: of_it,
+            } = Identified::find(&sheet.columns, &candidates(sheet, &names, &taken, &found));
+            (found, doubt) = (triads, of_it);
         }
         let is_new = |&of: &Sensor| *by_name.get(of) == 0 && !found.get(of).is_empty();
         let others = |of| found.get(of).iter().skip(1).copied().collect();
@@ -90,6 +92,7 @@ impl Columns {
             triads: PerSensor::from_fn(|sensor| found.get(sensor).first().copied()),
             others: PerSensor::from_fn(others),
             by_size: Sensor::ALL.iter().any(is_new),
+            doubt,
             temperature,
             quaternion,
         }
@@ -112,7 +115,7 @@ impl Columns {
             if let Some(triad) = of_triads.get(sensor) {
                 *self.triads.get_mut(sensor) = Some(*triad);
                 self.others.get_mut(sensor).clear();
-                self.by_size = false;
+                (self.by_size, self.doubt) = (false, None);
             }
         }
         if time.is_some() {
@@ -314,73 +317,49 @@ pub fn by_stem(names: &[Name], candidates: &[usize]) -> Vec<[usize; 3]> {
     triads
 }
 
-/// Triads identified by value instead of name: accelerometers by the constant magnitude of gravity, gyros by turns.
-fn by_numbers(
+/// The triads by name; of a sensor without names, all that the names and units of other columns allow.
+fn candidates(
     sheet: &Sheet,
     names: &[Name],
     taken: &[usize],
-    found: &mut PerSensor<Vec<[usize; 3]>>,
-) {
-    let varies = |k: &usize| varies(&sheet.columns[*k]);
+    by_name: &PerSensor<Vec<Triad>>,
+) -> PerSensor<Vec<Triad>> {
     let is_free = |k: &usize| {
         !taken.contains(k) && !names[*k].is_of_another_sensor() && is_numeric(sheet, *k)
     };
+    let varies = |k: &usize| varies(&sheet.columns[*k]);
+    let free: Vec<usize> = (0..names.len()).filter(is_free).collect();
     let has_stem = |k: &usize| names[*k].stem.contains(char::is_alphabetic);
-    let magnitudes = |free: &[usize]| {
-        let named: Vec<usize> = free.iter().copied().filter(has_stem).collect();
-        let mut triads = by_stem(names, &named);
-        triads.retain(|triad| triad.iter().any(varies));
-        if triads.is_empty() {
-            let side_by_side = free.chunks_exact(3).map(|of| [of[0], of[1], of[2]]);
-            triads.extend(side_by_side.filter(|triad| triad.iter().all(varies)));
+    let with_stem: Vec<usize> = free.iter().copied().filter(has_stem).collect();
+    let mut named = by_stem(names, &with_stem);
+    let is_alone = |triad: &Triad| {
+        let same = |k: &&usize| names[**k].stem == names[triad[0]].stem;
+        with_stem.iter().filter(same).count() == 3
+    };
+    named.retain(|triad| is_alone(triad) && triad.iter().any(varies));
+    let mut all = consecutive(
+        &sheet.columns,
+        &free.into_iter().filter(varies).collect::<Vec<_>>(),
+    );
+    // Columns that are named as a triad stay together.
+    all.retain(|triad| named.iter().all(|other| !overlap(triad, other)));
+    all.extend(named);
+    all.sort_unstable();
+    PerSensor::from_fn(|sensor| {
+        let is_of = |k: usize| match names[k].unit.map(|unit| unit.of) {
+            Some(Of::Rows(of_unit, _)) => of_unit == sensor,
+            Some(Of::Time | Of::Other) => false,
+            Some(Of::Count) | None => true,
+        };
+        match &by_name.get(sensor)[..] {
+            [] => all
+                .iter()
+                .filter(|triad| triad.iter().all(|&k| is_of(k)))
+                .copied()
+                .collect(),
+            named => named.to_vec(),
         }
-        let with_size = |triad| (triad, magnitude(sheet, &triad));
-        triads.into_iter().map(with_size).collect::<Vec<_>>()
-    };
-    let even = |sizes: &[([usize; 3], (f64, f64))], limit: f64| {
-        let is_even = |(_, (uneven, lively)): &(_, _)| *uneven < limit && *lively < LIVELY;
-        sizes.iter().position(is_even)
-    };
-    let mut free: Vec<usize> = (0..names.len()).filter(is_free).collect();
-    let mut sizes = magnitudes(&free);
-    if even(&sizes, EVEN).is_none() {
-        // Constant columns may be between triads.
-        free.retain(varies);
-        sizes = magnitudes(&free);
-    }
-    if found.accel.is_empty() {
-        let is_pair = found.gyro.is_empty() && sizes.len() > 1;
-        let of = |k: &usize| sizes[*k].1.0;
-        let all = (0..sizes.len()).filter(|_| is_pair);
-        let least = || all.min_by(|a, b| of(a).total_cmp(&of(b)));
-        // A compass usually comes after them.
-        let best = even(&sizes, EVEN).or_else(least).or(even(&sizes, UNEVEN));
-        found.accel.extend(best.map(|k| sizes.remove(k).0));
-    }
-    if found.gyro.is_empty() {
-        // If there are several, the gyro is usually next to the accelerometer.
-        let place = found.accel.first().map_or(0, |accel| accel[0]);
-        sizes.sort_by_key(|(triad, (_, lively))| (*lively < LIVELY, triad[0].abs_diff(place)));
-        found.gyro.extend(sizes.iter().map(|(triad, _)| *triad));
-    }
-}
-
-/// Median deviation of the magnitude of a triad from its median, and its 99 % quantile, divided by the median.
-fn magnitude(sheet: &Sheet, triad: &[usize; 3]) -> (f64, f64) {
-    let at = |row: usize| Vector3::from(triad.map(|k| sheet.columns[k][row]));
-    let samples = (0..sheet.rows()).map(at);
-    let samples: Vec<Vector3<f64>> = samples.filter(|sample| sample.sum().is_finite()).collect();
-    let zero = offset(&samples).unwrap_or(0.0);
-    let sizes = samples.iter().map(|sample| sample.add_scalar(-zero).norm());
-    let mut sizes: Vec<f64> = sizes.collect();
-    let Some(middle) = median(&mut sizes).filter(|middle| *middle > 0.0) else {
-        return (f64::INFINITY, f64::INFINITY);
-    };
-    let mut off: Vec<f64> = sizes.iter().map(|size| (size - middle).abs()).collect();
-    let off = median(&mut off).unwrap_or(0.0);
-    let hundredth = (sizes.len() - 1) / 100;
-    sizes.sort_unstable_by(|a, b| b.total_cmp(a));
-    (off / middle, sizes[hundredth] / middle)
+    })
 }
 
 /// Four adjacent columns with similar or uninformative names whose squares add up to one in every row.

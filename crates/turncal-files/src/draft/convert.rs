@@ -39,7 +39,10 @@ impl Draft {
             rows_as_text(&source(accel), &directory.join(ACCEL_FILE))?;
         }
         let accel = streams.accel.is_some().then(|| ACCEL_FILE.to_owned());
-        streams.written = Some(Written { accel });
+        streams.written = Some(Written {
+            accel,
+            is_exchanged: false,
+        });
         let path = directory.join("run.toml");
         fs::write(&path, self.to_toml(GYRO_FILE))
             .map_err(|error| FileError::unwritten(&path, &error))

@@ -150,14 +150,18 @@ impl Draft {
         let names = triad.map(|k| self.columns.names[k].as_str()).join(" ");
         let certainty = match unit.word {
             None => Certainty::Unknown,
-            Some(_) if unit.is_shown => Certainty::Certain,
+            Some(_) if unit.is_shown && self.columns.doubt.is_none() => Certainty::Certain,
             Some(_) => Certainty::Guess,
         };
         let mut value = format!("{names}, {}", unit.word.unwrap_or("unit unknown"));
         if let Some(scale) = &unit.scale {
             value += &format!(" ({})", scale.why);
         }
-        let mut why = unit.why.clone();
+        let doubt = self.columns.doubt.as_ref();
+        let doubt = doubt.map_or(String::new(), |doubt| {
+            format!("; {}", self.doubt_words(doubt))
+        });
+        let mut why = unit.why.clone() + &doubt;
         if let Some(down) = self.down.filter(|_| sensor == Sensor::Accel) {
             why += &format!("; at the start {}", self.down_words(down));
         }

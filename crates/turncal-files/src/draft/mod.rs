@@ -11,6 +11,7 @@ mod stated;
 mod streams;
 mod text;
 mod time;
+mod triads;
 mod turns;
 mod units;
 

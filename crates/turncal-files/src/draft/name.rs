@@ -93,7 +93,7 @@ impl Name {
 
     pub fn of(name: &str) -> Self {
         let (mut rest, mut found) = (name.to_owned(), None);
-        if let Some(open) = name.find(['[', '(']) {
+        if let Some(open) = name.rfind(['[', '(']) {
             let inside = name[open..].trim_matches(['[', ']', '(', ')', ' ']);
             found = unit(inside);
             let within = Self::of(inside);
@@ -260,6 +260,8 @@ mod tests {
             ("X Accel [x8004]", Accel, 'x', None),
             ("UncalGyroXRadPerSec", Gyro, 'x', Some("rad/s")),
             ("Gyroscope Y CAL", Gyro, 'y', None),
+            ("gyroADC[0] (deg/s)", Gyro, '0', Some("deg/s")),
+            ("accSmooth[2] (m/s/s)", Accel, '2', Some("m/s^2")),
             ("acc_z_m_s2", Accel, 'z', Some("m/s^2")),
             ("ARS-X [deg/s]", Gyro, 'x', Some("deg/s")),
         ] {

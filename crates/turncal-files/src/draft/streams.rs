@@ -3,6 +3,7 @@
 use super::columns::{self, Columns, by_stem};
 use super::name::Name;
 use super::time;
+use super::triads::{Triad, uneven};
 use crate::Sheet;
 use crate::joined;
 use crate::joined::Part;
@@ -41,6 +42,8 @@ pub struct Streams {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Written {
     pub accel: Option<String>,
+    /// Whether the gyros are in this file, and the accelerometers in the log.
+    pub is_exchanged: bool,
 }
 
 /// Minimum number of rows of a run.
@@ -61,6 +64,8 @@ struct Member {
     triads: PerSensor<Option<[usize; 3]>>,
     /// The time column, with its unit if known.
     time: Option<(String, String)>,
+    /// A triad without a name, with the scatter of the logarithm of its magnitude.
+    unnamed: Option<(Triad, f64)>,
 }
 
 impl Streams {
@@ -69,7 +74,9 @@ impl Streams {
         file: &DataFile,
         wanted: Option<&str>,
     ) -> Result<Option<(Self, Sheet)>, FileError> {
-        let (members, mut damage) = match streams::open(file)? {
+        let log = streams::open(file)?;
+        let is_text = log.is_none();
+        let (members, mut damage) = match log {
             Some(log) => {
                 let (found, damage) = streams::survey(file, log);
                 let member = |found| Member::of_stream(file, found);
@@ -91,7 +98,7 @@ impl Streams {
             let advice = suggestion(wanted, all(), "Correct or omit --stream.");
             return Err(FileError::of(file, found, expected, advice));
         }
-        if members.is_empty() {
+        if members.is_empty() && is_text {
             return Ok(None);
         }
         let Some((gyro, accel)) = chosen(&members, wanted) else {
@@ -120,12 +127,19 @@ impl Streams {
         accel: &DataFile,
         accel_name: Option<&str>,
     ) -> Result<(Self, Sheet), FileError> {
-        let gyro = Member::of_rows(gyro, Sensor::Gyro)?;
-        let accel = Member::of_rows(accel, Sensor::Accel)?;
-        let [gyro, accel] = [&gyro, &accel];
+        let first = Member::of_rows(gyro, Sensor::Gyro)?;
+        let mut pair = [first, Member::of_rows(accel, Sensor::Accel)?];
+        tell_apart(&mut pair);
+        let is_accel = |of: &Member| of.triads.accel.is_some() && of.triads.gyro.is_none();
+        let is_exchanged = is_accel(&pair[0]) && pair[1].triads.gyro.is_some();
+        if is_exchanged {
+            pair.reverse();
+        }
+        let [gyro, accel] = &pair;
         let (mut streams, sheet) = Self::of_pair(&PerSensor { gyro, accel }, false)?;
         streams.written = Some(Written {
             accel: accel_name.map(str::to_owned),
+            is_exchanged,
         });
         Ok((streams, sheet))
     }
@@ -198,6 +212,12 @@ impl Streams {
                 time_unit: Some(TimeUnitField::of_text(unit)),
                 ..AccelFromFile::default()
             });
+            let other = imu.accel_from.as_mut().and_then(|of| of.file.as_mut());
+            if let Some(other) =
+                other.filter(|_| self.written.as_ref().is_some_and(|of| of.is_exchanged))
+            {
+                std::mem::swap(&mut imu.file, other);
+            }
             let why =
                 "accelerometers use their own clock; --with time-offset estimates the difference";
             remarks.reason("imu.accel_from", why);
@@ -236,6 +256,7 @@ impl Member {
             is_stream: true,
             triads,
             time: time.map(|column| (column.name.clone(), column.unit.to_owned())),
+            unnamed: None,
             found,
         }
     }
@@ -255,10 +276,15 @@ impl Member {
         let topics = ["sensor_gyro_", "sensor_accel_"];
         let is_of_px4 = topics.iter().any(|topic| stem.contains(topic));
         found.stream.axes = is_of_px4.then_some("frd");
+        let triad = columns.triads.gyro.or(columns.triads.accel);
+        let of_stream = Self::of_stream(file, found);
+        let is_named = of_stream.triads != PerSensor::default();
+        let unnamed = triad.filter(|_| columns.by_size && !is_named);
         Ok(Self {
             is_stream: false,
             time: columns.time.map(|k| (sheet.names[k].clone(), unit)),
-            ..Self::of_stream(file, found)
+            unnamed: unnamed.map(|triad| (triad, uneven(&sheet.columns, &triad))),
+            ..of_stream
         })
     }
 
@@ -301,6 +327,25 @@ impl Member {
             unit = time::Clock::find(&sheet, &mut columns).unit;
         }
         Ok((name, unit))
+    }
+}
+
+/// Assigns triads without names in two files: gravity keeps the magnitude of accelerometers constant.
+fn tell_apart(pair: &mut [Member; 2]) {
+    let accel = match [&pair[0], &pair[1]].map(|of| of.unnamed) {
+        [Some((_, first)), Some((_, second))] => usize::from(second <= first),
+        [Some(_), None] => usize::from(pair[1].triads.gyro.is_none()),
+        [None, _] => usize::from(pair[0].triads.gyro.is_some()),
+    };
+    for (place, of) in pair.iter_mut().enumerate() {
+        let sensor = if place == accel {
+            Sensor::Accel
+        } else {
+            Sensor::Gyro
+        };
+        if let Some((triad, _)) = of.unnamed {
+            *of.triads.get_mut(sensor) = Some(triad);
+        }
     }
 }
 

@@ -7,6 +7,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
 
+mod columns;
 mod turns;
 
 /// Three quarter turns about each axis in turn with rests between, at 100 Hz; `row` makes a line of time,

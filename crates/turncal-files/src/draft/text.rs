@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::name::is_of_autopilot;
+use super::triads::Doubt;
 use super::{AXES_OF_PROGRAM, Draft, NO_COLUMNS};
 use crate::schema::page;
 use crate::schema::page::Remarks;
@@ -267,11 +268,12 @@ impl Draft {
                 remarks.before("imu.columns", format_args!("{name} could also be {other}"));
             }
         }
-        if columns.by_size && columns.triads.gyro.is_some() {
-            remarks.before(
-                "imu.columns",
-                "The triads were identified by their values: gravity keeps the magnitude of the accelerometers constant.",
-            );
+        if let Some(doubt) = &columns.doubt {
+            let words = self.doubt_words(doubt);
+            remarks.before("imu.columns", format_args!("Guess: {words}"));
+        } else if columns.by_size && columns.triads.gyro.is_some() {
+            let why = "The triads were identified by their values: the gyros turn the vector of the accelerometers.";
+            remarks.before("imu.columns", why);
         }
         if let Some((down, accel)) = self.down.zip(columns.triads.accel) {
             let reversed = accel.map(|k| format!("-{}", columns.names[k]));
@@ -281,6 +283,32 @@ impl Draft {
                 toml::Value::from(reversed.to_vec())
             );
             remarks.before("imu.columns", remark);
+        }
+    }
+
+    /// Why the triads that were identified by value are a guess, and what to check.
+    pub fn doubt_words(&self, doubt: &Doubt) -> String {
+        match doubt {
+            Doubt::Order(order) => {
+                let sign = |sign: f64| if sign < 0.0 { "-" } else { "" };
+                let signed =
+                    |&(k, of): &(usize, f64)| format!("{}{}", sign(of), self.columns.names[k]);
+                let order: Vec<String> = order.iter().map(signed).collect();
+                let gyro = toml::Value::from(order);
+                format!(
+                    "gravity turns as with gyro = {gyro}; check the order of the axes in the logger"
+                )
+            }
+            Doubt::Rival(rival) => {
+                let [gyro, accel] = [rival.gyro, rival.accel].map(|triad| self.list(&triad));
+                format!(
+                    "gyro = {gyro} with accel = {accel} fits as well; check the columns in the logger"
+                )
+            }
+            Doubt::NoTurns => {
+                "no turn of gravity compares the columns; check them in the logger, or record turns"
+                    .to_owned()
+            }
         }
     }
 

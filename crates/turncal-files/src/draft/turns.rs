@@ -19,7 +19,7 @@ const FINER: i32 = 20;
 /// Trials within this factor of the best count as the best.
 const SAME: f64 = 1.25;
 /// Largest square error of a fitting unit, relative to the error without rotation.
-const GOOD: f64 = 0.1;
+pub const GOOD: f64 = 0.1;
 /// Factor by which other units fit worse.
 const TOLD_APART: f64 = 3.0;
 

@@ -74,17 +74,17 @@ impl Quantities {
         found.opposed = motion.angle.is_some_and(|angle| angle < 0.0);
         // The accelerometers show which quantity the rows contain.
         for sensor in [Sensor::Accel, Sensor::Gyro] {
-            let first = columns.triads.get(sensor).map(|triad| triad[0]);
+            let triad = *columns.triads.get(sensor);
             let named = |k: usize| Name::of_column(&sheet.names[k], &sheet.units[k]).unit;
             let rows = TriadRows {
                 motion,
                 period: clock.period.unwrap_or(f64::NAN),
                 is_stated: clock.is_stated,
-                named: first.and_then(named),
+                named: triad.into_iter().flatten().find_map(named),
                 whole: *whole.get(sensor),
             };
             let unit = found.unit(sensor, &rows);
-            *found.units.get_mut(sensor) = match first {
+            *found.units.get_mut(sensor) = match triad {
                 Some(_) => unit,
                 None => Unit::default(),
             };

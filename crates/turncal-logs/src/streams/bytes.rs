@@ -11,6 +11,7 @@ pub struct Broken {
     pub offset: u64,
     pub found: String,
     pub expected: String,
+    pub advice: String,
 }
 
 impl Broken {
@@ -19,6 +20,7 @@ impl Broken {
             offset,
             found: found.to_string(),
             expected: expected.to_string(),
+            advice: "Record or copy the file again.".to_owned(),
         }
     }
 }

@@ -14,6 +14,8 @@ const HEADER: u64 = 128;
 const MATRIX: u64 = 14;
 const COMPRESSED: u64 = 15;
 const STRUCT: u8 = 2;
+/// An object of a class of MATLAB, whose content only MATLAB reads.
+const OBJECT: u8 = 17;
 /// Maximum nesting depth of structures.
 const DEEPEST: usize = 8;
 /// Valid types of elements, from numbers to text in UTF-32.
@@ -43,7 +45,7 @@ pub fn open(mut input: Input) -> Result<Box<dyn Log>, Broken> {
         elements.push((kind, size, offset));
     }
     let file = Shared::new(input);
-    let mut arrays = Vec::new();
+    let (mut arrays, mut objects) = (Vec::new(), Vec::new());
     for (kind, length, offset) in elements {
         let packing = match kind {
             MATRIX => Packing::Stored,
@@ -66,9 +68,37 @@ pub fn open(mut input: Input) -> Result<Box<dyn Log>, Broken> {
             }
         }
         let end = reader.end;
-        reader.matrix(end, "", 0, &mut arrays)?;
+        objects.extend(reader.matrix(end, "", 0, &mut arrays)?);
     }
-    Ok(Box::new(Arrays::new(arrays)))
+    match objects.is_empty() || !arrays.is_empty() {
+        true => Ok(Box::new(Arrays::new(arrays))),
+        false => Err(of_objects(&objects)),
+    }
+}
+
+/// Refuses a file of objects alone, given by name and class, with what to do in MATLAB.
+fn of_objects(objects: &[[String; 2]]) -> Broken {
+    let found = objects
+        .iter()
+        .map(|[name, class]| format!("`{name}` ({class})"));
+    let found = format!(
+        "objects of MATLAB: {}",
+        found.collect::<Vec<_>>().join(", ")
+    );
+    let tables = objects.iter().filter(|[_, class]| class == "timetable");
+    let tables: Vec<&str> = tables.map(|[name, _]| &**name).collect();
+    let advice = match &tables[..] {
+        [] => "In MATLAB, save arrays: save('imu.mat', 'time', 'gyro', 'accel', '-v7').".to_owned(),
+        [table] => format!("In MATLAB: writetimetable({table}, 'imu.csv')."),
+        _ => {
+            let tables = tables.join(", ");
+            format!("In MATLAB: writetimetable(synchronize({tables}), 'imu.csv').")
+        }
+    };
+    Broken {
+        advice,
+        ..Broken::new(0, found, "arrays of numbers")
+    }
 }
 
 /// Byte order of a file with this header.
@@ -225,19 +255,25 @@ impl Reader {
         number.unwrap_or(0.0).max(0.0) as usize
     }
 
-    /// Adds the columns of the array that ends at this offset; fields of a structure are named after it.
+    /// Adds the columns of the array that ends at this offset; fields of a structure are named after it. Returns name
+    /// and class if it is an object.
     fn matrix(
         &mut self,
         end: u64,
         name: &str,
         depth: usize,
         arrays: &mut Vec<Array>,
-    ) -> Result<(), Broken> {
+    ) -> Result<Option<[String; 2]>, Broken> {
         if self.at >= end {
-            return Ok(());
+            return Ok(None);
         }
         let flags = self.element("the type of an array")?;
         let class = Kind::U32.number(&flags, self.big_endian).unwrap_or(0.0) as u32 as u8;
+        if class == OBJECT {
+            let mut word = || Ok(text(&self.element("the class of an object")?));
+            let [name, _, class] = [word()?, word()?, word()?];
+            return Ok(Some([name, class]));
+        }
         let dimensions = self.element("the size of an array")?;
         let shape = (0..dimensions.len() / 4).map(|k| self.count(&dimensions, k));
         let shape: Vec<usize> = shape.collect();
@@ -251,11 +287,11 @@ impl Reader {
             STRUCT if shape.iter().all(|&size| size == 1) && depth < DEEPEST => {
                 self.structure(&name, depth, arrays)?;
             }
-            // Numeric classes, from double to uint64.
-            6..=15 => arrays.extend(self.numbers(name, shape)?),
+            // Numbers, from double to uint64. The content of objects has no name.
+            6..=15 if !name.is_empty() => arrays.extend(self.numbers(name, shape)?),
             _ => {}
         }
-        Ok(())
+        Ok(None)
     }
 
     /// Adds the arrays that are fields of a structure.

@@ -90,10 +90,8 @@ pub fn open(path: &DataFile) -> Result<Option<Box<dyn Log>>, FileError> {
     let input = Input::new(Box::new(file)).map_err(|error| path.refused(&error))?;
     (format.open)(input)
         .map(Some)
-        .map_err(|broken| broken.of(path, ADVICE))
+        .map_err(|broken| broken.of(path, &broken.advice))
 }
-
-const ADVICE: &str = "Record or copy the file again.";
 
 impl Format {
     fn is_of(&self, begin: &[u8]) -> bool {

@@ -183,6 +183,7 @@ impl Rows for StreamRows {
             offset,
             found,
             expected,
+            ..
         } = self.damage.as_ref()?;
         Some(format!(
             "{}, byte {offset}: found {found}, expected {expected}. turncal used the {} samples of `{}` before it.",
