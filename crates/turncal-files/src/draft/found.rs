@@ -89,7 +89,7 @@ impl Draft {
 
     /// Units that are neither known nor whole counts: a rate or a unit may be wrong that only turns and gravity show.
     pub(crate) fn doubts(&self) -> impl Iterator<Item = String> + '_ {
-        Sensor::ALL.into_iter().filter_map(|sensor| {
+        let of_units = Sensor::ALL.into_iter().filter_map(|sensor| {
             let unit = self.quantities.units.get(sensor);
             let scale = unit.scale.as_ref().filter(|_| unit.is_unfit)?;
             let (name, why, found) = (sensor.name(), &unit.why, &scale.why);
@@ -97,7 +97,8 @@ impl Draft {
                 "The unit of the {name} rows is not clear: {why}. turncal estimated {found}. Check --rate, and state \
                  --{name}-unit."
             ))
-        })
+        });
+        self.clock.doubt.clone().into_iter().chain(of_units)
     }
 
     fn time_found(&self) -> Found {
@@ -105,7 +106,7 @@ impl Draft {
         let name = self.columns.time.map(|k| self.columns.names[k].as_str());
         let hertz = |rate: f64| format!("{} Hz", rounded(rate, 4));
         let (value, certainty) = match (name, clock.period.map(f64::recip)) {
-            (None, Some(rate)) if self.stated.rate_hz.is_some() => {
+            (None, Some(rate)) if self.stated.rate_hz.is_some() && clock.doubt.is_none() => {
                 return Found::new("time", hertz(rate), Certainty::Certain, "as stated");
             }
             (Some(name), Some(rate)) => (

@@ -154,6 +154,8 @@ impl InstrumentFields<'_> {
         let mut imu = self.log.read(notes)?;
         if self.without_period {
             imu = self.with_found_period(imu, notes)?;
+        } else {
+            imu.period_sigma = self.period_sigma;
         }
         notes.extend(faults::notes(&imu));
         notes.extend(self.clock_note(&imu));
