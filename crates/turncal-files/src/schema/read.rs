@@ -82,6 +82,8 @@ pub fn run_of_text(
         standstill: standstill(&file.standstill),
         segment_sigma: position_sigma.map_or(SET_BY_HAND, |sigma| sigma.0 * DEGREE),
     };
+    let aligned = run.align_table();
+    run.recording.notes.extend(aligned);
     run.recording.doubts = run.doubts();
     Ok(run)
 }
