@@ -7,6 +7,7 @@ mod doubts;
 mod dwell;
 mod dwells;
 pub mod motion;
+mod table_clock;
 mod turning;
 
 pub use dwell::{Dwell, MeanOutput, Position};

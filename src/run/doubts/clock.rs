@@ -17,19 +17,32 @@ use crate::units::{DEGREE, PPM};
 const SHORTER_WAY: f64 = 1.0;
 
 /// A move from one dwell to the next.
-struct Move {
+pub struct Move {
     /// Total angle according to the gyros and to the table, counting both senses of rotation, rad.
     gyros: f64,
     table: f64,
     /// Mean time according to the table, and delay of the gyros, s.
-    time: f64,
-    late: f64,
+    pub time: f64,
+    pub late: f64,
     /// Tolerance for the difference of the two angles of one move, rad.
     tolerance: f64,
     /// Difference caused by the uncertainty of the bias from dwells, rad.
     zero: f64,
     /// The longest time between two readings, s.
     interval: f64,
+}
+
+impl Move {
+    /// Whether the gyros and the table turn by different angles.
+    pub fn differs(&self) -> bool {
+        (self.gyros - self.table).abs() > self.tolerance
+    }
+}
+
+/// The largest delay that readings and samples do not resolve, s.
+pub fn resolved(run: &Run, moves: &[Move]) -> f64 {
+    let interval = moves.iter().map(|m| m.interval).fold(0.0, f64::max);
+    interval + run.recording.imu.period
 }
 
 /// Total angle of steps, rad, their mean time, s, and the maximum rate, rad/s. Each step has mid-time and duration, s,
@@ -52,8 +65,7 @@ fn way(steps: impl Iterator<Item = (f64, f64, f64)>, noise: f64, zero: f64) -> [
 /// This reveals missing rows in one log, clock drift and logs from different runs, for any time stamps.
 pub fn clock(run: &Run) -> Option<String> {
     let moves = moves(run, run.recording.table.as_ref()?);
-    let is_another = |m: &&Move| (m.gyros - m.table).abs() > m.tolerance;
-    let mut others = moves.iter().filter(is_another);
+    let mut others = moves.iter().filter(|of| of.differs());
     if let Some(first) = others.next() {
         return Some(format!(
             "In {} of {} moves the gyros and the table turn by different angles. The first is at {:.1} s: the gyros \
@@ -66,8 +78,7 @@ pub fn clock(run: &Run) -> Option<String> {
             first.table / DEGREE
         ));
     }
-    let interval = moves.iter().map(|m| m.interval).fold(0.0, f64::max);
-    let resolved = interval + run.recording.imu.period;
+    let resolved = resolved(run, &moves);
     if moves.iter().any(|m| m.late.abs() > resolved) {
         other_times(&moves, resolved, run.recording.imu.period)
     } else {

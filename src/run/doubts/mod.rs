@@ -1,6 +1,6 @@
 //! Checks of a run on input. They report unusual but possible facts.
 
-mod clock;
+pub mod clock;
 mod columns;
 mod quaternions;
 

@@ -90,7 +90,7 @@ impl Draft {
     /// Units that are neither known nor whole counts: perhaps a rate or unit that only turns and gravity can check is
     /// wrong.
     pub(crate) fn doubts(&self) -> impl Iterator<Item = String> + '_ {
-        let units = Sensor::ALL.into_iter().filter_map(|sensor| {
+        let of_units = Sensor::ALL.into_iter().filter_map(|sensor| {
             let unit = self.quantities.units.get(sensor);
             let scale = unit.scale.as_ref().filter(|_| unit.is_unfit)?;
             let (name, why, found) = (sensor.name(), &unit.why, &scale.why);
@@ -104,7 +104,8 @@ impl Draft {
              biases, add --gyro-unit."
                 .to_owned()
         });
-        units.chain(left_out)
+        let of_clock = self.clock.doubt.clone().into_iter();
+        of_clock.chain(of_units).chain(left_out)
     }
 
     fn time_found(&self) -> Found {
@@ -120,7 +121,7 @@ impl Draft {
         let name = self.columns.time.map(|k| self.columns.names[k].as_str());
         let hertz = |rate: f64| format!("{} Hz", rounded(rate, 4));
         let (value, certainty) = match (name, clock.period.map(f64::recip)) {
-            (None, Some(rate)) if self.stated.rate_hz.is_some() => {
+            (None, Some(rate)) if self.stated.rate_hz.is_some() && clock.doubt.is_none() => {
                 return Found::new("time", hertz(rate), Certainty::Certain, "as stated");
             }
             (Some(name), Some(rate)) => (

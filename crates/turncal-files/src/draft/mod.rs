@@ -6,6 +6,7 @@ mod found;
 mod motion;
 mod name;
 mod priors;
+mod rates;
 mod raw_samples;
 mod stated;
 mod streams;
@@ -20,10 +21,10 @@ use std::path::Path;
 use nalgebra::Vector3;
 
 use crate::Sheet;
-use crate::instrument::USUAL_PERIOD;
 use columns::Columns;
 pub use found::Found;
-use motion::{FOLLOWED, Motion};
+use motion::Motion;
+use rates::Rates;
 use raw_samples::RawSamples;
 pub use stated::{DataSheetError, KalibrImu, Stated, StatedColumns, StatedUnit};
 use streams::{FEWEST_ROWS, Streams};
@@ -188,7 +189,8 @@ impl Draft {
     }
 
     fn of_sheet(mut sheet: Sheet, streams: Option<Streams>, stated: &Stated) -> Self {
-        sheet.rate = stated.rate_hz.or(sheet.rate);
+        let written = sheet.rate;
+        sheet.rate = stated.rate_hz.or(written);
         let only = sheet.goes_on.then(|| sheet.rows());
         let instance = match streams {
             Some(_) => None,
@@ -198,22 +200,33 @@ impl Draft {
         columns.state(&stated.columns);
         retain_samples(&mut sheet, &columns);
         let clock = Clock::find(&sheet, &mut columns);
-        let of_clock = || columns::standing_time(&sheet).filter(|_| clock.period.is_none());
-        let contradiction = match stated.rate_hz {
-            Some(rate) => clock.contradiction(rate),
-            None => of_clock().map(|(name, value)| {
-                [
-                    format!("{value} in all rows of the column `{name}`"),
-                    "times that increase".to_owned(),
-                    "Log the time of each row, or set --rate.".to_owned(),
-                ]
-            }),
+        let standing = columns::standing_time(&sheet).filter(|_| clock.period.is_none());
+        let rates = Rates {
+            sheet: &sheet,
+            columns: &columns,
+            stated,
+            written,
         };
-        let rows = columns.samples(&sheet).map(|(numbers, triads)| {
-            let period = clock.period.unwrap_or(USUAL_PERIOD);
-            let breaks = clock.breaks(&numbers, period, FOLLOWED);
-            RawSamples::new(triads, breaks, period)
-        });
+        let has_times = streams.as_ref().is_some_and(|of| of.time.is_some());
+        let agreed = if has_times {
+            Ok(clock)
+        } else {
+            rates.agreed(clock)
+        };
+        let (clock, contradiction) = match agreed {
+            Ok(clock) => (
+                clock,
+                standing.map(|(name, value)| {
+                    [
+                        format!("{value} in all rows of the column `{name}`"),
+                        "times that increase".to_owned(),
+                        "Log the time of each row, or set --rate.".to_owned(),
+                    ]
+                }),
+            ),
+            Err((clock, contradiction)) => (clock, Some(contradiction)),
+        };
+        let rows = rates.rows(&clock);
         let down = rows.as_ref().and_then(RawSamples::points_down);
         let mut draft = Self {
             down: down.and_then(|axis| Some(columns.triads.accel?[axis])),

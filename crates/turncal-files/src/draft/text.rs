@@ -13,6 +13,7 @@ use crate::schema::{
 };
 use turncal::imu::{Noise, NoiseKeys, Output, Sensor};
 use turncal::number::rounded;
+use turncal::units::PPM;
 use turncal_input::{Finite, Gravity, Height, Latitude, NonNegative, Positive};
 
 /// `[imu.noise]` of `run.toml`.
@@ -87,6 +88,8 @@ impl Draft {
             sample_period_s: self.period(remarks),
             gyro_unit: self.unit(Sensor::Gyro, remarks),
             accel_unit: self.unit(Sensor::Accel, remarks),
+            sample_period_sigma_ppm: (clock.sigma > 0.0)
+                .then(|| NonNegative(rounded(clock.sigma / PPM, 3))),
             time_unit: (clock.unit != "s").then(|| TimeUnitField::of_text(&clock.unit)),
             time_stamp: TimeStamp::End,
             continuous: Some(self.cuts() == 0 && !self.of_means),
@@ -104,6 +107,8 @@ impl Draft {
             streams.describe(&mut imu, remarks);
         }
         remarks.reason("imu.output", &found.output_why);
+        let why = "1σ of the rate, which no time stamps confirm; it is part of the σ of the gyro scale factors";
+        remarks.reason("imu.sample_period_sigma_ppm", why);
         if found.opposed {
             remarks.before(
                 "imu.time_unit",

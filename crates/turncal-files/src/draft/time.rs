@@ -5,6 +5,7 @@ use std::path::Path;
 use super::columns::Columns;
 use super::name::Name;
 use crate::Sheet;
+use crate::instrument::RATE_SIGMA;
 use crate::quantity::units_of_time;
 use turncal::number::rounded;
 use turncal::statistics::median;
@@ -13,7 +14,7 @@ use turncal_logs::clock::Uniform;
 /// Plausible sample periods, s (5 kHz to 5 Hz): units that differ by 1000 cannot both be plausible.
 pub const PERIODS: std::ops::Range<f64> = 2e-4..0.2;
 /// Steps within this factor match a stated rate.
-const STATED: f64 = 1.2;
+pub const STATED: f64 = 1.2;
 
 /// Certainty of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -53,6 +54,12 @@ pub struct Clock {
     pub gaps: Vec<Gap>,
     /// Steps that do not increase.
     pub repeated: usize,
+    /// Mean step of the time column, in its unit.
+    pub step: Option<f64>,
+    /// Relative 1σ of the period, if it is not that of time stamps.
+    pub sigma: f64,
+    /// Reason to doubt it.
+    pub doubt: Option<String>,
 }
 
 impl Clock {
@@ -74,6 +81,7 @@ impl Clock {
         let known = stated.or(tick.filter(|period| PERIODS.contains(period)));
         let seconds = || units_of_time().map(|(_, second)| second);
         let usual = rounded(steps.mean, 6);
+        let mut sigma = 0.0;
         let (second, why) = if columns.nanoseconds.is_some() {
             (Some(1.0), "seconds and nanoseconds".to_owned())
         } else if named.is_some() {
@@ -84,8 +92,10 @@ impl Clock {
             let is_near = |second: &f64| (steps.mean * second / period).ln().abs() < STATED.ln();
             // Ticks of the log's own clock.
             let own = || steps.is_whole.then(|| period / steps.mean);
-            let tick = name.tick().filter(is_near).or_else(own);
-            Some((seconds().find(is_near).or(tick)?, period))
+            let tick = name.tick().filter(is_near);
+            let known = seconds().find(is_near).or(tick);
+            sigma = if known.is_some() { 0.0 } else { RATE_SIGMA };
+            Some((known.or_else(own)?, period))
         }) {
             let rate = rounded(period.recip(), 6);
             (Some(second), format!("steps of {usual} at {rate} Hz"))
@@ -109,6 +119,56 @@ impl Clock {
             is_stated: second.is_none() && stated.is_some(),
             gaps: steps.gaps,
             repeated: steps.repeated,
+            step: Some(steps.mean),
+            sigma: if second.is_none() && stated.is_some() {
+                RATE_SIGMA
+            } else {
+                sigma
+            },
+            doubt: None,
+        }
+    }
+
+    /// A clock whose rate is off by this much more than its σ, if its rate is not that of time stamps.
+    pub fn within(self, off: f64) -> Self {
+        let sigma = if self.sigma > 0.0 {
+            self.sigma.hypot(off)
+        } else {
+            0.0
+        };
+        Self { sigma, ..self }
+    }
+
+    /// The clock with rows of this period and its relative 1σ instead of its own; with a doubt unless the user states it.
+    pub fn given_up(self, period: f64, sigma: f64, is_doubted: bool) -> Self {
+        let [rate, former] =
+            [Some(period), self.period].map(|of| of.map(|of| rounded(of.recip(), 4)));
+        let (rate, former) = (rate.unwrap_or(f64::NAN), former.unwrap_or(f64::NAN));
+        let times = self.period.map_or(f64::NAN, |of| rounded(period / of, 4));
+        let why = format!(
+            "turns fit the unit of the gyros at {rate} Hz, not at {former} Hz ({})",
+            self.why
+        );
+        let tick = self
+            .step
+            .filter(|_| self.unit != "count")
+            .map(|step| rounded(period / step, 7));
+        let doubt = format!(
+            "The clock of the log is doubtful: turns fit the unit of the gyros only if a row lasts {times} times as long as \
+             at {former} Hz ({}; {}). turncal used {rate} Hz{}. State --rate, or --gyro-unit if that is wrong.",
+            self.unit,
+            self.why,
+            tick.map_or(String::new(), |tick| format!(", a tick of {tick:?} s")),
+        );
+        Self {
+            unit: tick.map_or(self.unit, |tick| format!("{tick:?}")),
+            certainty: Certainty::Guess,
+            why,
+            period: Some(period),
+            is_stated: tick.is_none(),
+            sigma,
+            doubt: is_doubted.then_some(doubt),
+            ..self
         }
     }
 
@@ -141,6 +201,9 @@ impl Clock {
             is_stated: period.is_some(),
             gaps: Vec::new(),
             repeated: 0,
+            step: None,
+            sigma: period.map_or(0.0, |_| RATE_SIGMA),
+            doubt: None,
         }
     }
 }

@@ -4,11 +4,12 @@ mod data_sheet;
 mod hypothesis;
 
 use data_sheet::Scale;
+pub use hypothesis::TURNS_TOLD_APART;
 use hypothesis::{Hypothesis, TriadRows};
 
 use super::columns::Columns;
 use super::motion::Motion;
-use super::name::Name;
+use super::name::{self, Name};
 use super::stated::{Stated, StatedUnit};
 use super::time::{Clock, PERIODS};
 use crate::quantity::{Of, units};
@@ -230,10 +231,12 @@ impl Quantities {
         // The sum of the rows is the angle.
         let measured = angle.map(|angle| row / angle);
         let measured = measured.filter(|scale| scale.is_finite());
+        // A unit of the file that turns contradict is in doubt, as are fractions in no unit.
+        let is_unfit = !rows.whole || by_name.is_some();
         Unit {
             word: Some("count"),
-            is_shown: measured.is_some() && rows.whole,
-            is_unfit: measured.is_some() && !rows.whole,
+            is_shown: measured.is_some() && !is_unfit,
+            is_unfit: measured.is_some() && is_unfit,
             scale: measured.map(|per_rad| Scale::of_turns(per_rad, self.output)),
             ..Unit::open(&why)
         }
@@ -298,6 +301,23 @@ impl Quantities {
 
     pub fn is_count(&self, sensor: Sensor) -> bool {
         self.units.get(sensor).word == Some("count")
+    }
+
+    /// The period for which turns fit the unit of the gyros, stated, in the file or found; for rates.
+    pub fn turned_period(
+        &self,
+        stated: &Stated,
+        named: Option<name::Unit>,
+        motion: &Motion,
+    ) -> Option<f64> {
+        let (sensor, unit) = (Sensor::Gyro, self.units.get(Sensor::Gyro));
+        let stated = stated.gyro_unit.map(|StatedUnit(of)| of);
+        let per_si = match stated.or(named) {
+            Some(of) => unit_scale(sensor, of.word)? / of.times,
+            None => unit_scale(sensor, unit.word.filter(|_| unit.scale.is_none())?)?,
+        };
+        let angle = motion.angle.filter(|_| self.output == Output::Rate)?;
+        Some(angle.abs() * per_si)
     }
 
     /// Factor that converts rows to rates.

@@ -28,6 +28,8 @@ pub const USUAL_BIAS: PerSensor<f64> = PerSensor {
 };
 /// Assumed sample period until estimated from motion, s.
 pub const USUAL_PERIOD: f64 = 0.01;
+/// Relative 1σ of a rate that no time stamps confirm: the tolerance of the oscillators of MEMS.
+pub const RATE_SIGMA: f64 = 0.01;
 /// Maximum relative 1σ of a scale factor.
 const WIDEST_SCALE: f64 = 10.0;
 /// Maximum 1σ of a bias, beyond the range of any instrument, rad/s or m/s².
@@ -51,6 +53,8 @@ pub struct InstrumentFields<'a> {
     pub known: Instrument,
     /// Whether the sample period is stated neither in run.toml nor by a time column.
     pub without_period: bool,
+    /// Relative 1σ of the sample period.
+    pub period_sigma: f64,
 }
 
 impl<'a> Fields<'a> {
@@ -108,10 +112,18 @@ impl<'a> Fields<'a> {
             nominal: known.nominal,
             full_scale: PerSensor::from_fn(|sensor| imu.of(sensor).full_scale),
         };
+        let is_confirmed = log.clock.column.is_some() || self.run.turntable.is_some();
+        let usual = if is_confirmed || log.output != Output::Rate {
+            0.0
+        } else {
+            RATE_SIGMA
+        };
+        let stated = imu.sample_period_sigma_ppm.map(|sigma| sigma.0 * PPM);
         Ok(InstrumentFields {
             log,
             known,
             without_period,
+            period_sigma: stated.unwrap_or(usual),
         })
     }
 

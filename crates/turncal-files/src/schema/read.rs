@@ -85,6 +85,8 @@ pub fn run_of_text(
         standstill: standstill(&file.standstill),
         segment_sigma: position_sigma.map_or(SET_BY_HAND, |sigma| sigma.0 * DEGREE),
     };
+    let aligned = run.align_table();
+    run.recording.notes.extend(aligned);
     run.recording.doubts = run.doubts();
     Ok(run)
 }
@@ -157,6 +159,8 @@ impl InstrumentFields<'_> {
         let mut imu = self.log.read(notes)?;
         if self.without_period {
             imu = self.with_found_period(imu, notes)?;
+        } else {
+            imu.period_sigma = self.period_sigma;
         }
         notes.extend(faults::notes(&imu));
         notes.extend(self.clock_note(&imu));

@@ -91,6 +91,8 @@ pub struct ImuFile {
     pub time_unit: Option<TimeUnitField>,
     /// Time from row to row, s; default from the time stamps
     pub sample_period_s: Option<Positive>,
+    /// 1σ of the sample period, ppm; default 10000 without a time column and a [turntable], otherwise 0
+    pub sample_period_sigma_ppm: Option<NonNegative>,
     /// Whether a stamp marks the end, the start or the middle of its sample
     pub time_stamp: TimeStamp,
     /// False if the file contains concatenated sections; default true

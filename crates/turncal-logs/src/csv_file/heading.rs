@@ -281,7 +281,9 @@ impl Looks {
             names,
             line,
             clocks,
-            rate: says.iter().find_map(|remark| rate(remark)),
+            rate: says
+                .iter()
+                .find_map(|remark| rate(remark).or(lone_rate(remark))),
             remarks,
             above,
             rows: rows.len(),
@@ -542,7 +544,9 @@ fn are_distinct(names: &[String]) -> bool {
 /// The rate in Hz from a line such as `Update Rate: 100.0Hz` or `sampling rate,100`.
 fn rate(remark: &str) -> Option<f64> {
     let remark = remark.to_lowercase();
-    let (before, rest) = remark.split_once("rate").or(remark.split_once("freq"))?;
+    let key = || remark.strip_prefix("fs").map(|rest| ("sample", rest));
+    let named = remark.split_once("rate").or(remark.split_once("freq"));
+    let (before, rest) = named.or_else(key)?;
     let begin = rest.find(|c: char| c.is_ascii_digit())?;
     let number = &rest[begin..];
     let end = number.find(|c: char| !c.is_ascii_digit() && c != '.');
@@ -557,6 +561,12 @@ fn rate(remark: &str) -> Option<f64> {
         unit.starts_with("hz") || rest[..begin].contains("hz") || unit.is_empty() && is_of_rows();
     let rate = number.parse().ok().filter(|rate| *rate > 0.0);
     rate.filter(|_| in_hertz)
+}
+
+/// A number alone in its line above the rows, if it can be a rate in Hz.
+fn lone_rate(remark: &str) -> Option<f64> {
+    let rate = remark.parse().ok()?;
+    (5.0..=5000.0).contains(&rate).then_some(rate)
 }
 
 /// A text in UTF-8, otherwise in Latin 1 (the first 256 characters of Unicode).

@@ -6,10 +6,12 @@ use turncal::imu::{Output, PerSensor, Sensor};
 use turncal::number::rounded;
 use turncal::units::STANDARD_GRAVITY;
 
+/// Factor by which turns tell rates and units of gyros apart.
+pub const TURNS_TOLD_APART: f64 = 1.3;
 /// Gravity at rest and turns distinguish units that differ by more than this factor, because raw sensors may be off by
 /// tenths.
 const TOLD_APART: PerSensor<f64> = PerSensor {
-    gyro: 1.3,
+    gyro: TURNS_TOLD_APART,
     accel: 1.25,
 };
 

@@ -1,0 +1,145 @@
+//! The clock after all that tells the rate is held against each other: stamps in their unit, the stated rate, the rate in
+//! the preamble, and turns in the unit of the gyros.
+
+use super::columns::Columns;
+use super::motion::{FOLLOWED, Motion};
+use super::name::Name;
+use super::raw_samples::RawSamples;
+use super::stated::Stated;
+use super::time::{Certainty, Clock, PERIODS, STATED};
+use super::units::{Quantities, TURNS_TOLD_APART};
+use crate::Sheet;
+use crate::instrument::{RATE_SIGMA, USUAL_PERIOD, USUAL_SCALE};
+use turncal::imu::Sensor;
+use turncal::number::rounded;
+
+/// Statements about the rate of a log.
+pub struct Rates<'a> {
+    pub sheet: &'a Sheet,
+    pub columns: &'a Columns,
+    pub stated: &'a Stated,
+    /// Rate in the preamble, Hz.
+    pub written: Option<f64>,
+}
+
+fn are_near(one: f64, other: f64, factor: f64) -> bool {
+    (one / other).ln().abs() < factor.ln()
+}
+
+impl Rates<'_> {
+    /// The rows of a clock.
+    pub fn rows(&self, clock: &Clock) -> Option<RawSamples> {
+        let (numbers, triads) = self.columns.samples(self.sheet)?;
+        let period = clock.period.unwrap_or(USUAL_PERIOD);
+        let breaks = clock.breaks(&numbers, period, FOLLOWED);
+        Some(RawSamples::new(triads, breaks, period))
+    }
+
+    /// The clock that most statements allow, with a doubt if one of the file is given up; `Err` if a statement of the
+    /// user is contradicted: evidence, statement, remedy.
+    pub fn agreed(&self, clock: Clock) -> Result<Clock, (Clock, [String; 3])> {
+        let told = clock.period.zip(self.shown(&clock));
+        let contradiction = (self.stated.rate_hz).and_then(|rate| clock.contradiction(rate));
+        let Some((period, (shown, is_another_unit))) = told else {
+            return match contradiction {
+                Some(contradiction) => Err((clock, contradiction)),
+                None => Ok(self.doubted_by_preamble(clock)),
+            };
+        };
+        if are_near(shown, period, TURNS_TOLD_APART) {
+            return match contradiction {
+                Some(contradiction) => Err((clock, contradiction)),
+                None => Ok(clock.within(excess(shown / period))),
+            };
+        }
+        let rates = self.stated.rate_hz.into_iter().chain(self.written);
+        let other = rates
+            .map(f64::recip)
+            .find(|&other| are_near(shown, other, TURNS_TOLD_APART));
+        if let Some(other) = other {
+            let sigma = RATE_SIGMA.hypot(excess(shown / other));
+            return Ok(clock.given_up(other, sigma, self.stated.rate_hz.is_none()));
+        }
+        let is_usual = |period: &f64| PERIODS.contains(period);
+        let by_turns = || {
+            self.contradicted_by_turns(&clock, shown)
+                .filter(|_| !is_another_unit)
+        };
+        let of_turns = |[found, stated, _]: [String; 3]| {
+            let turned = rounded(shown.recip(), 3);
+            [
+                format!("{found}, and turns that fit the unit of the gyros at {turned} Hz"),
+                stated,
+                "Correct --rate, or state the unit of the gyros with --gyro-unit.".to_owned(),
+            ]
+        };
+        match contradiction.map(of_turns).or_else(by_turns) {
+            Some(contradiction) => Err((clock, contradiction)),
+            None if is_usual(&shown) && !is_usual(&period) => {
+                Ok(clock.given_up(shown, USUAL_SCALE / 3f64.sqrt(), true))
+            }
+            None => Ok(clock),
+        }
+    }
+
+    /// The period that turns show in the unit of the gyros, s, and whether they fit another unit at the period of the
+    /// clock.
+    fn shown(&self, clock: &Clock) -> Option<(f64, bool)> {
+        let (rows, period) = (self.rows(clock)?, clock.period?);
+        let found = |clock: &Clock, motion: &Motion| {
+            Quantities::find(self.sheet, self.columns, clock, rows.whole, motion)
+        };
+        let motion = rows.motion();
+        let triad = self.columns.triads.gyro?;
+        let named = Name::of_column(&self.sheet.names[triad[0]], &self.sheet.units[triad[0]]).unit;
+        let quantities = found(clock, &motion);
+        let angle = |motion: &Motion| quantities.turned_period(self.stated, named, motion);
+        let shown = angle(&motion)?;
+        let is_another = named.is_some() && quantities.units.get(Sensor::Gyro).is_shown;
+        if are_near(shown, period, TURNS_TOLD_APART) {
+            return Some((shown, is_another));
+        }
+        // Windows at rest are as long as the clock makes them.
+        let again = self.rows(&clock.clone().given_up(shown, 0.0, false))?;
+        Some((angle(&again.motion()).unwrap_or(shown), is_another))
+    }
+
+    /// A stated rate that only the turns contradict.
+    fn contradicted_by_turns(&self, clock: &Clock, shown: f64) -> Option<[String; 3]> {
+        let (rate, turned) = (self.stated.rate_hz?, rounded(shown.recip(), 3));
+        let is_of_rate = clock.sigma > 0.0 || self.columns.time.is_none();
+        is_of_rate.then(|| {
+            let times = rounded(shown * rate, 3);
+            [
+                format!("turns that fit the unit of the gyros only at {turned} Hz, where a row lasts {times} times as long"),
+                format!("{rate} Hz, as stated"),
+                format!("State --rate {turned}, or the unit of the gyros with --gyro-unit."),
+            ]
+        })
+    }
+
+    /// Two rates of the file, of which nothing tells the right one.
+    fn doubted_by_preamble(&self, clock: Clock) -> Clock {
+        let pair = self.written.zip(clock.period.map(f64::recip));
+        let other = pair.filter(|(written, of_stamps)| !are_near(*written, *of_stamps, STATED));
+        match other.filter(|_| self.stated.rate_hz.is_none()) {
+            None => clock,
+            Some((written, of_stamps)) => Clock {
+                certainty: Certainty::Guess,
+                doubt: Some(format!(
+                    "The preamble of the log states {written} Hz, its time stamps {} Hz, and no turn tells which is \
+                     right. turncal used the time stamps. State --rate.",
+                    rounded(of_stamps, 4)
+                )),
+                ..clock
+            },
+        }
+    }
+}
+
+/// The size of the error of a rate if turns take this many times the period: what the usual error of a mean scale factor
+/// does not explain.
+fn excess(longer: f64) -> f64 {
+    let unexplained = (longer - 1.0).powi(2) - USUAL_SCALE.powi(2) / 3.0;
+    unexplained.max(0.0).sqrt()
+}
