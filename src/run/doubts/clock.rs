@@ -177,7 +177,7 @@ fn bias_at_rest(run: &Run, stands: &[Dwell]) -> (Vector3<f64>, f64) {
 /// Moves that both logs resolve, each from the middle of one standstill of the table to the middle of the next, and the
 /// spans before the first and after the last that both logs cover. Two moves treated as one would have a time error if
 /// the scale factors of their axes differ.
-fn moves(run: &Run, table: &TableLog) -> Vec<Move> {
+pub fn moves(run: &Run, table: &TableLog) -> Vec<Move> {
     let imu = &run.recording.imu;
     let stands = standstills(run, table);
     // A single dwell does not show how wrong its bias is.
