@@ -214,7 +214,7 @@ fn whole_numbers_beyond_two_to_the_53_keep_their_digits_and_text_that_is_left_ou
 fn a_time_in_another_unit_and_rows_that_are_left_out_are_told_by_gravity() {
     let closed_form = "calibrate run.toml --method six-position --json";
     for case in ["time_both_ms_noperiod", "every_second_row_noperiod"] {
-        let says = "sample_period_s or time_unit";
+        let says = "or time_unit";
         refused(&format!("wrong-input-{case}"), closed_form, says);
     }
 }

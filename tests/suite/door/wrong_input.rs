@@ -296,12 +296,6 @@ fn each_wrong_row_or_column_has_its_message() {
         (
             "imu.csv",
             "\n0.50,1,",
-            "\n0.50,one,",
-            "line 51, column `gx` & `one` & finite",
-        ),
-        (
-            "imu.csv",
-            "\n0.50,1,",
             "\n0.50,inf,",
             "line 51, column `gx` & `inf` & finite",
         ),
@@ -316,12 +310,6 @@ fn each_wrong_row_or_column_has_its_message() {
             "\n0.50,1,",
             "\n0.50,1.5,",
             "line 51, column `gx` & `1.5` & whole & increment",
-        ),
-        (
-            "imu.csv",
-            "\n0.50,1,",
-            "\n0.50,1,1,",
-            "line 51 & 8 fields & 7",
         ),
         (
             "imu.csv",
@@ -440,7 +428,11 @@ fn missing_damaged_and_foreign_files_have_their_message() {
 
     fs::write(at("imu.csv"), imu()).unwrap();
     fs::write(at("run.toml"), RUN.replace("\"gy\"", "\"gx\"")).unwrap();
-    assert_says(&error(), "imu.csv", "`gx` used for two & run.toml");
+    assert_says(
+        &error(),
+        "imu.csv",
+        "`gx` used for two & Name another column",
+    );
 
     fs::write(at("run.toml"), RUN.replace("imu.csv", "imu.mat")).unwrap();
     assert_says(&error(), "imu.mat", "cannot open & relative to run.toml");

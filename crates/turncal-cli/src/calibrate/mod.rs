@@ -69,7 +69,7 @@ const FOLLOWING: &str = "Following a log";
   turncal calibrate my-run/run.toml --aiding velocity
   turncal calibrate my-run/run.toml --json | jq .gyro.scale
   turncal calibrate my-run/run.toml --temperature
-  turncal calibrate x_up.csv x_down.csv y_up.csv y_down.csv z_up.csv z_down.csv
+  turncal calibrate x_up.csv x_down.csv y_up.csv y_down.csv z_up.csv
   turncal calibrate campaign.toml -o mine
   turncal calibrate lot/*/run.toml -o lot-result \\
       --specification specification.toml

@@ -486,9 +486,8 @@ fn rows_that_a_tag_tells_apart_are_streams_and_constants_no_axes() {
     has(
         &text,
         &[
-            "stream = \"Uni\"",
             "gyro_unit = \"rad/s\"",
-            "columns = { gyro = [\"2\", \"3\", \"4\"], accel = [\"5\", \"6\", \"7\"] }",
+            "columns = { time = \"1\", gyro = [\"3\", \"4\", \"5\"], accel = [\"6\", \"7\", \"8\"] }",
         ],
     );
 }

@@ -6,6 +6,7 @@
 
 mod fit;
 
+pub use fit::Triad;
 use fit::{Moments, Order};
 use nalgebra::Vector3;
 
@@ -16,8 +17,6 @@ use turncal::units::STANDARD_GRAVITY;
 use super::raw_samples::offset;
 use super::turns::GOOD;
 use crate::quantity::units;
-
-pub type Triad = [usize; 3];
 
 /// Number of windows compared, those with the largest changes.
 const MOST_WINDOWS: usize = 512;

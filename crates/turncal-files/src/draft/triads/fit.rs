@@ -2,7 +2,8 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::Triad;
+/// Places of three columns.
+pub type Triad = [usize; 3];
 
 /// One, f, w and the products of f and w.
 const TERMS: usize = 16;
