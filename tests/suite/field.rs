@@ -628,3 +628,189 @@ fn objects_of_matlab_are_refused_with_the_command_that_writes_their_rows() {
         "{message}"
     );
 }
+
+fn json_of(log: &Path, further: &[&str]) -> Result<serde_json::Value, String> {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_turncal"));
+    command.arg("calibrate").arg(log).args(further);
+    let output = command.args(["--json"]).output().unwrap();
+    let result = serde_json::from_slice(&output.stdout);
+    result.map_err(|_| String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+/// Gyro scale factors relative to the nominal ones, and their 1σ.
+fn gyro_scale(result: &serde_json::Value) -> [[f64; 2]; 3] {
+    [0, 1, 2].map(|axis| {
+        let number = |path: &str| {
+            let value = result.pointer(&format!("{path}/{axis}"));
+            value.and_then(serde_json::Value::as_f64).unwrap()
+        };
+        let nominal = number("/provenance/nominal/gyro");
+        ["/gyro/scale", "/sigma/gyro/scale"].map(|path| number(path) / nominal)
+    })
+}
+
+/// Ticks of 21.75 µs labelled ms: turns and the unit of the gyros give the clock up, and a stated rate that they allow is
+/// used.
+#[test]
+fn a_label_of_time_that_turns_contradict_is_given_up() {
+    let Some(log) = file("c25-ticks-called-ms", "fifo.csv") else {
+        return;
+    };
+    let text = draft(&log);
+    has(&text, &["time_unit = 2.1", "gyro_unit = \"mdps\""]);
+    let closed = ["--method", "six-position", "--gravity", "9.809"];
+    let result = json_of(&log, &closed).unwrap();
+    let words = result.to_string();
+    assert!(
+        words.contains("a row lasts 0.02144 times as long"),
+        "{words}"
+    );
+    assert_ne!(result["verdict"]["word"], "good");
+    assert_calibrates(&log, &["--gravity", "9.809", "--rate", "40"]);
+    let refused = json_of(&log, &[&closed[..], &["--rate", "100"]].concat());
+    let refused = refused.unwrap_err();
+    assert!(
+        refused.contains("turns that fit the unit of the gyros at 40.6"),
+        "{refused}"
+    );
+}
+
+/// The rows of a simulated sensor in mdps and mg.
+fn simulated_rows(place: &Path) -> Vec<String> {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_turncal"));
+    let run = place.join("run");
+    command
+        .args(["simulate", "mems", "--seed", "5", "-o"])
+        .arg(&run);
+    command.assert().success();
+    let mut text = String::new();
+    let packed = fs::File::open(run.join("imu.csv.gz")).unwrap();
+    std::io::Read::read_to_string(&mut flate2::read::GzDecoder::new(packed), &mut text).unwrap();
+    let row = |line: &str| {
+        let values = line.split(',').skip(1).enumerate().map(|(k, value)| {
+            let unit = if k < 3 { DEGREES } else { 1.0 / 9.80665 };
+            let value: f64 = value.parse().unwrap();
+            format!("{:.4}", 1e3 * unit * value)
+        });
+        values.collect::<Vec<_>>().join(",")
+    };
+    text.lines().skip(1).map(row).collect()
+}
+
+/// A preamble, the name of a time column with its step, a stated rate.
+type Told = (String, Option<(&'static str, f64)>, Option<f64>);
+
+/// What a log of 100 Hz says of its rate, wrong or right, drawn at random.
+fn drawn(seed: u64) -> Told {
+    use rand::{RngExt, SeedableRng};
+    let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+    let mut factor = |least: f64, most: f64| {
+        let exponent: f64 = rng.random_range(least.ln()..most.ln());
+        let inverse: bool = rng.random();
+        exponent.exp().powi(if inverse { -1 } else { 1 })
+    };
+    let preamble = |rate: f64| match seed / 5 % 3 {
+        0 => format!("Fs,{rate}\n"),
+        1 => format!("{rate}\n"),
+        _ => format!("Sample Rate: {rate} Hz\n"),
+    };
+    let none = String::new();
+    match seed % 5 {
+        // Other factors may be scale factors.
+        0 => (
+            none,
+            Some(("timestamp[us]", 1e4 * factor(1.3, 100.0))),
+            None,
+        ),
+        1 => (none, None, Some(100.0 * factor(1.01, 4.0))),
+        2 => (preamble(100.0 * factor(1.01, 4.0)), None, None),
+        3 => (
+            none,
+            Some(("timestamp", 1000.0)),
+            Some(100.0 * factor(1.01, 4.0)),
+        ),
+        _ => (
+            preamble(100.0),
+            Some(("timestamp[us]", 1e4 * factor(1.01, 50.0))),
+            None,
+        ),
+    }
+}
+
+/// Right, refused, with a finding that names the clock, or within 4 σ; never GOOD with more.
+#[test]
+fn a_rate_that_is_off_is_right_named_or_in_the_sigma() {
+    let place = tempfile::tempdir().unwrap();
+    let rows = simulated_rows(place.path());
+    let names = "gyr_x[mdps],gyr_y[mdps],gyr_z[mdps],acc_x[mg],acc_y[mg],acc_z[mg]\n";
+    let log = place.path().join("log.csv");
+    let calibrated = |(preamble, time, rate): Told| {
+        let column = time.map_or(String::new(), |(name, _)| format!("{name},"));
+        let mut text = format!("{preamble}{column}{names}");
+        for (k, row) in rows.iter().enumerate() {
+            if let Some((_, step)) = time {
+                text += &format!("{:.0},", step * k as f64);
+            }
+            text += row;
+            text.push('\n');
+        }
+        fs::write(&log, text).unwrap();
+        let rate = rate.map(|rate| format!("--rate={rate}"));
+        let closed = ["--method", "six-position", "--gravity", "9.80665"];
+        let all: Vec<&str> = closed.into_iter().chain(rate.as_deref()).collect();
+        json_of(&log, &all)
+    };
+    let right = calibrated((String::new(), Some(("time[us]", 1e4)), None));
+    let right = gyro_scale(&right.unwrap());
+    for seed in 0..20 {
+        let Ok(result) = calibrated(drawn(seed)) else {
+            continue;
+        };
+        let all = gyro_scale(&result).into_iter().zip(right);
+        let off = all.map(|([found, sigma], [truth, _])| (found - truth).abs() / sigma);
+        let off = off.fold(0.0, f64::max);
+        let words = result.to_string();
+        let is_named = [
+            "clock of the log is doubtful",
+            "unit of the gyro rows is not clear",
+        ]
+        .iter()
+        .any(|named| words.contains(named));
+        assert!(off < 4.0 || is_named, "{seed}: {:?}, {off} σ", drawn(seed));
+        assert!(off < 4.0 || result["verdict"]["word"] != "good", "{seed}");
+    }
+}
+
+/// The table's clock is 3 s ahead, or drifts: the values are those of one clock.
+#[test]
+fn a_table_log_by_another_clock_is_put_on_that_of_the_imu() {
+    use turncal::simulation::Scenario;
+    let made = Scenario::load("demo").unwrap().simulate(31, 0).unwrap();
+    for (late, drift) in [(3.0, 0.0), (-10.0, 0.0), (10.0, 1e-4)] {
+        let mut run = made.run.clone();
+        let sound = run.recording.table.clone().unwrap().time;
+        let table = run.recording.table.as_mut().unwrap();
+        table
+            .time
+            .iter_mut()
+            .for_each(|time| *time += late + drift * *time);
+        let note = run.align_table().unwrap();
+        assert!(
+            note.contains("put the table log on the clock of the IMU"),
+            "{note}"
+        );
+        let time = &run.recording.table.as_ref().unwrap().time;
+        let off = time
+            .iter()
+            .zip(&sound)
+            .map(|(time, sound)| (time - sound).abs());
+        assert!(off.fold(0.0, f64::max) < 0.02, "{note}");
+        let period_sigma = run.recording.imu.period_sigma;
+        assert!((period_sigma - drift).abs() < 3e-5, "{period_sigma}");
+        assert!(
+            run.doubts()
+                .iter()
+                .all(|doubt| !doubt.contains("than the table"))
+        );
+    }
+}

@@ -46,25 +46,24 @@ impl Rates<'_> {
                 None => Ok(self.doubted_by_preamble(clock)),
             };
         };
+        let rates = self.stated.rate_hz.into_iter().chain(self.written);
+        let mut rates = rates.map(f64::recip);
         if are_near(shown, period, TURNS_TOLD_APART) {
+            let off = |of: f64| (shown / of).ln().abs();
+            let is_rival = rates.any(|other| off(other) < off(period));
             return match contradiction {
                 Some(contradiction) => Err((clock, contradiction)),
-                None => Ok(clock.within(excess(shown / period))),
+                None => Ok(clock.within(excess(shown / period), is_rival)),
             };
         }
-        let rates = self.stated.rate_hz.into_iter().chain(self.written);
-        let other = rates
-            .map(f64::recip)
-            .find(|&other| are_near(shown, other, TURNS_TOLD_APART));
+        let other = rates.find(|&other| are_near(shown, other, TURNS_TOLD_APART));
         if let Some(other) = other {
             let sigma = RATE_SIGMA.hypot(excess(shown / other));
             return Ok(clock.given_up(other, sigma, self.stated.rate_hz.is_none()));
         }
         let is_usual = |period: &f64| PERIODS.contains(period);
-        let by_turns = || {
-            self.contradicted_by_turns(&clock, shown)
-                .filter(|_| !is_another_unit)
-        };
+        let is_of_stamps = clock.sigma == 0.0;
+        let by_turns = || self.contradicted_by_turns(shown).filter(|_| !is_of_stamps);
         let of_turns = |[found, stated, _]: [String; 3]| {
             let turned = rounded(shown.recip(), 3);
             [
@@ -75,7 +74,10 @@ impl Rates<'_> {
         };
         match contradiction.map(of_turns).or_else(by_turns) {
             Some(contradiction) => Err((clock, contradiction)),
-            None if is_usual(&shown) && !is_usual(&period) => {
+            // A unit of the file that another replaces leaves stamps right, but not a rate that nothing confirms.
+            None if is_usual(&shown)
+                && !(is_of_stamps && (is_another_unit || is_usual(&period))) =>
+            {
                 Ok(clock.given_up(shown, USUAL_SCALE / 3f64.sqrt(), true))
             }
             None => Ok(clock),
@@ -104,18 +106,17 @@ impl Rates<'_> {
         Some((angle(&again.motion()).unwrap_or(shown), is_another))
     }
 
-    /// A stated rate that only the turns contradict.
-    fn contradicted_by_turns(&self, clock: &Clock, shown: f64) -> Option<[String; 3]> {
+    /// A stated rate that turns contradict.
+    fn contradicted_by_turns(&self, shown: f64) -> Option<[String; 3]> {
         let (rate, turned) = (self.stated.rate_hz?, rounded(shown.recip(), 3));
-        let is_of_rate = clock.sigma > 0.0 || self.columns.time.is_none();
-        is_of_rate.then(|| {
-            let times = rounded(shown * rate, 3);
-            [
-                format!("turns that fit the unit of the gyros only at {turned} Hz, where a row lasts {times} times as long"),
-                format!("{rate} Hz, as stated"),
-                format!("State --rate {turned}, or the unit of the gyros with --gyro-unit."),
-            ]
-        })
+        let times = rounded(shown * rate, 3);
+        Some([
+            format!(
+                "turns that fit the unit of the gyros only at {turned} Hz, where a row lasts {times} times as long"
+            ),
+            format!("{rate} Hz, as stated"),
+            format!("State --rate {turned}, or the unit of the gyros with --gyro-unit."),
+        ])
     }
 
     /// Two rates of the file, of which nothing tells the right one.

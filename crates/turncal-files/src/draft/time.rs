@@ -129,9 +129,10 @@ impl Clock {
         }
     }
 
-    /// A clock whose rate is off by this much more than its σ, if its rate is not that of time stamps.
-    pub fn within(self, off: f64) -> Self {
-        let sigma = if self.sigma > 0.0 {
+    /// A clock whose rate is off by this much more than its σ, if it is not that of time stamps or has a rival.
+    pub fn within(self, off: f64, has_rival: bool) -> Self {
+        let is_doubted = self.sigma > 0.0 || has_rival;
+        let sigma = if is_doubted {
             self.sigma.hypot(off)
         } else {
             0.0
