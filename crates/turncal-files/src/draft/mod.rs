@@ -209,12 +209,12 @@ impl Draft {
         };
         let has_times = streams.as_ref().is_some_and(|of| of.time.is_some());
         let agreed = if has_times {
-            Ok(clock)
+            (clock, None)
         } else {
             rates.agreed(clock)
         };
         let (clock, contradiction) = match agreed {
-            Ok(clock) => (
+            (clock, None) => (
                 clock,
                 standing.map(|(name, value)| {
                     [
@@ -224,7 +224,7 @@ impl Draft {
                     ]
                 }),
             ),
-            Err((clock, contradiction)) => (clock, Some(contradiction)),
+            told => told,
         };
         let rows = rates.rows(&clock);
         let down = rows.as_ref().and_then(RawSamples::points_down);

@@ -35,15 +35,15 @@ impl Rates<'_> {
         Some(RawSamples::new(triads, breaks, period))
     }
 
-    /// The clock that most statements allow, with a doubt if one of the file is given up; `Err` if a statement of the
-    /// user is contradicted: evidence, statement, remedy.
-    pub fn agreed(&self, clock: Clock) -> Result<Clock, (Clock, [String; 3])> {
+    /// The clock that most statements allow, with a doubt if one of the file is given up; and the evidence against a
+    /// statement of the user, the statement and the remedy.
+    pub fn agreed(&self, clock: Clock) -> (Clock, Option<[String; 3]>) {
         let told = clock.period.zip(self.shown(&clock));
         let contradiction = (self.stated.rate_hz).and_then(|rate| clock.contradiction(rate));
         let Some((period, (shown, is_another_unit))) = told else {
             return match contradiction {
-                Some(contradiction) => Err((clock, contradiction)),
-                None => Ok(self.doubted_by_preamble(clock)),
+                Some(contradiction) => (clock, Some(contradiction)),
+                None => (self.doubted_by_preamble(clock), None),
             };
         };
         let rates = self.stated.rate_hz.into_iter().chain(self.written);
@@ -52,14 +52,15 @@ impl Rates<'_> {
             let off = |of: f64| (shown / of).ln().abs();
             let is_rival = rates.any(|other| off(other) < off(period));
             return match contradiction {
-                Some(contradiction) => Err((clock, contradiction)),
-                None => Ok(clock.within(excess(shown / period), is_rival)),
+                Some(contradiction) => (clock, Some(contradiction)),
+                None => (clock.within(excess(shown / period), is_rival), None),
             };
         }
         let other = rates.find(|&other| are_near(shown, other, TURNS_TOLD_APART));
         if let Some(other) = other {
             let sigma = RATE_SIGMA.hypot(excess(shown / other));
-            return Ok(clock.given_up(other, sigma, self.stated.rate_hz.is_none()));
+            let clock = clock.given_up(other, sigma, self.stated.rate_hz.is_none());
+            return (clock, None);
         }
         let is_usual = |period: &f64| PERIODS.contains(period);
         let is_of_stamps = clock.sigma == 0.0;
@@ -73,14 +74,14 @@ impl Rates<'_> {
             ]
         };
         match contradiction.map(of_turns).or_else(by_turns) {
-            Some(contradiction) => Err((clock, contradiction)),
+            Some(contradiction) => (clock, Some(contradiction)),
             // A unit of the file that another replaces leaves stamps right, but not a rate that nothing confirms.
             None if is_usual(&shown)
                 && !(is_of_stamps && (is_another_unit || is_usual(&period))) =>
             {
-                Ok(clock.given_up(shown, USUAL_SCALE / 3f64.sqrt(), true))
+                (clock.given_up(shown, USUAL_SCALE / 3f64.sqrt(), true), None)
             }
-            None => Ok(clock),
+            None => (clock, None),
         }
     }
 

@@ -48,7 +48,7 @@ pub enum Doubt {
 /// Means over windows.
 struct Windows {
     means: Vec<Vec<f64>>,
-    /// The windows before the largest changes, and their effective number.
+    /// The windows before the largest changes, and the effective number of turns that they are of.
     moving: Vec<usize>,
     count: f64,
 }
@@ -287,8 +287,12 @@ impl Windows {
         let mut sizes: Vec<(f64, usize)> = (0..count.saturating_sub(1)).map(size).collect();
         sizes.sort_by(|a, b| b.0.total_cmp(&a.0));
         sizes.truncate(MOST_WINDOWS);
-        let sum = sizes.iter().map(|of| of.0).sum::<f64>();
-        let square = sizes.iter().map(|of| of.0 * of.0).sum::<f64>();
+        // Windows of one turn have their errors in common.
+        sizes.sort_by_key(|of| of.1);
+        let turns = sizes.chunk_by(|one, next| one.1 + 1 == next.1);
+        let turns = turns.map(|turn| turn.iter().map(|of| of.0).sum::<f64>());
+        let (sum, square) =
+            turns.fold((0.0, 0.0), |(sum, square), of| (sum + of, square + of * of));
         Self {
             means,
             moving: sizes.into_iter().map(|of| of.1).collect(),

@@ -214,13 +214,6 @@ fn counts(seeds: std::ops::Range<u64>) -> [usize; 3] {
 
 #[test]
 fn triads_without_names_are_right_or_asked() {
-    let [certain, asked, wrong] = counts(0..100);
-    println!("{certain} certain, {asked} asked, {wrong} wrong and asked");
-}
-
-#[test]
-#[ignore]
-fn unseen() {
-    let [certain, asked, wrong] = counts(100..200);
+    let [certain, asked, wrong] = counts(0..200);
     println!("{certain} certain, {asked} asked, {wrong} wrong and asked");
 }

@@ -107,9 +107,10 @@ impl Moments {
             }
             count += 1;
             found.terms.ger(1.0, &terms, &terms, 1.0);
-            for axis in 0..3 {
-                found.changes[axis].axpy(change[axis], &terms, 1.0);
-                found.squares[axis] += change[axis].powi(2);
+            let sums = found.changes.iter_mut().zip(&mut found.squares);
+            for ((sum, square), change) in sums.zip(change) {
+                sum.axpy(change, &terms, 1.0);
+                *square += change.powi(2);
             }
         }
         (3 * count > UNKNOWNS && found.squares.iter().all(|of| *of > 0.0)).then_some(found)
