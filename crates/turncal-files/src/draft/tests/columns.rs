@@ -154,7 +154,9 @@ fn table(seed: u64) -> Table {
     for (sensor, block) in blocks {
         for place in (0..block.len()).step_by(3) {
             let first = columns.len() + place;
-            sensor.map(|of| right.get_mut(of).push([first, first + 1, first + 2]));
+            if let Some(of) = sensor {
+                right.get_mut(of).push([first, first + 1, first + 2]);
+            }
         }
         columns.extend(block);
     }
