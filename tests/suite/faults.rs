@@ -284,13 +284,10 @@ fn time_comes_in_any_unit_or_not_at_all() {
 /// Of a record turned by hand, every turn of more than 1.2 rad/s is cut off there: 928 rows, most too long to be bridged.
 /// What is left shows the accelerometers as before, and of the gyros their biases.
 #[test]
-// It does not yet: a gyro's scale factor is 4.5 σ off, see docs/limits.md.
-#[should_panic(expected = "σ")]
 #[ignore = "slow: a hand-turned record twice"]
 fn a_record_whose_fast_turns_are_cut_off_agrees_with_the_whole() {
     let Some(whole) = shared("real-mems-lot-1") else {
-        // Skipped: nothing but a panic passes here.
-        panic!("no record, no σ");
+        return;
     };
     let here = tempfile::tempdir().unwrap();
     let text = std::fs::read_to_string(whole.join("run.toml")).unwrap();
