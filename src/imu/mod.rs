@@ -10,6 +10,7 @@ mod body_frame;
 mod installation;
 mod instrument;
 mod noise_keys;
+mod rounding;
 mod signal;
 mod terms;
 mod thermal;
@@ -20,6 +21,7 @@ pub use body_frame::BodyFrame;
 pub use installation::{ANGLES, InstallationForm};
 pub use instrument::Instrument;
 pub use noise_keys::NoiseKeys;
+pub use rounding::rounding_error;
 pub use signal::{GaussMarkov, MotionNoise, Noise, NoiseSource, Output, Pulses};
 pub use terms::{
     REFERENCE_RATE, Sensed, TERM_PARAMETERS, Term, TermEntry, TermResponse, TermVector,

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use thiserror::Error;
 
 use super::{Bridge, Fault, FaultKind, LogFacts, Series, Temperature};
-use crate::imu::{PerSensor, Sensor};
+use crate::imu::{Output, PerSensor, Sensor};
 
 /// The samples of both triads, at one period, in one stretch or several.
 #[derive(Debug, Clone, PartialEq)]
@@ -100,6 +100,19 @@ impl ImuSamples {
     /// Whether the samples are packed, as in long recordings.
     pub fn is_packed(&self) -> bool {
         self.gyro.is_packed()
+    }
+
+    /// Resolution of rates along body axes, rad/s or m/s²; zero if not rounded, or if rows are integrals, which may
+    /// carry the remainder.
+    pub fn resolution(&self, sensor: Sensor) -> Vector3<f64> {
+        // Means of positions are few, so their steps are not those of rounding.
+        let is_rounded = self.has(sensor) && !self.is_of_means();
+        let of_rates = |log: &&LogFacts| is_rounded && log.output == Output::Rate;
+        let Some(log) = self.log.as_ref().filter(of_rates) else {
+            return Vector3::zeros();
+        };
+        let columns = log.columns.get(sensor);
+        Vector3::from_fn(|axis, _| columns[axis].step_rate(self.period).unwrap_or(0.0))
     }
 
     /// Consecutive samples without a gap; the first begins at `start`, s.

@@ -495,6 +495,8 @@ fn what_is_rebuilt_calibrates_to_its_truth_from_the_log_alone() {
         ("b18-rows-tagged-by-sensor", "gnsslogger.txt", vec![]),
         ("b18-rows-tagged-by-sensor", "tagged.txt", vec![]),
         ("b19-kalibr-bag-csv", "kalibr.csv", vec![]),
+        ("c23-no-earth-rate", "imu.csv.gz", vec![]),
+        ("c32-erased-flash-rows", "flash.txt", vec!["--gravity", "9.809"]),
     ] {
         let Some(log) = file(case, name) else {
             continue;

@@ -7,7 +7,7 @@ use std::ops::Range;
 use nalgebra::Vector3;
 
 use crate::earth::ROTATION_RATE;
-use crate::imu::Sensor;
+use crate::imu::{Sensor, rounding_error};
 use crate::navigation::samples_of;
 use crate::recording::ImuSamples;
 use crate::recording::faults::ranges;
@@ -104,10 +104,14 @@ impl Windows {
         let found = SIGMA_OF_MEDIAN * FRAC_1_SQRT_2 * median(&mut known).unwrap_or(0.0);
         let stated = run.instrument.noise.get(sensor).random_walk / duration.sqrt();
         let pulse = imu.pulse.get(sensor) / duration;
+        // A mean of rounded values lies anywhere within a step unless their noise is as large as the step.
+        let step = imu.resolution(sensor).max();
+        let noise = stated.powi(2) * slide.length as f64 - step.powi(2) / 12.0;
+        let rounding = rounding_error(step, noise.max(0.0)).sqrt();
         Self {
             slide,
             means,
-            sigma: found.max(stated).max(pulse),
+            sigma: found.max(stated).max(pulse).max(rounding),
         }
     }
 

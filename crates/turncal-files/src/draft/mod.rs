@@ -196,11 +196,10 @@ impl Draft {
             Some(_) => None,
             None => retain_instance(&mut sheet),
         };
-        let mut columns = Columns::find(&sheet);
+        let mut columns = columns_of(&mut sheet);
         columns.state(&stated.columns);
         retain_samples(&mut sheet, &columns);
         let clock = Clock::find(&sheet, &mut columns);
-        let standing = columns::standing_time(&sheet).filter(|_| clock.period.is_none());
         let rates = Rates {
             sheet: &sheet,
             columns: &columns,
@@ -208,24 +207,12 @@ impl Draft {
             written,
         };
         let has_times = streams.as_ref().is_some_and(|of| of.time.is_some());
-        let agreed = if has_times {
+        let (clock, contradiction) = if has_times {
             (clock, None)
         } else {
             rates.agreed(clock)
         };
-        let (clock, contradiction) = match agreed {
-            (clock, None) => (
-                clock,
-                standing.map(|(name, value)| {
-                    [
-                        format!("{value} in all rows of the column `{name}`"),
-                        "times that increase".to_owned(),
-                        "Log the time of each row, or set --rate.".to_owned(),
-                    ]
-                }),
-            ),
-            told => told,
-        };
+        let contradiction = contradiction.or_else(|| standing_still(&sheet, &clock));
         let rows = rates.rows(&clock);
         let down = rows.as_ref().and_then(RawSamples::points_down);
         let mut draft = Self {
@@ -339,6 +326,35 @@ impl Draft {
 /// Angle in rad per gyro unit in one row, from the rotation of gravity; negative if the triads have opposite signs.
 pub fn turned_angle(triads: PerSensor<Vec<Vector3<f64>>>, period: f64) -> Option<f64> {
     RawSamples::new(triads, Vec::new(), period).motion().angle
+}
+
+/// Evidence, statement and remedy if the only time never changes.
+fn standing_still(sheet: &Sheet, clock: &Clock) -> Option<[String; 3]> {
+    let (name, value) = columns::standing_time(sheet).filter(|_| clock.period.is_none())?;
+    Some([
+        format!("{value} in all rows of the column `{name}`"),
+        "times that increase".to_owned(),
+        "Log the time of each row, or set --rate.".to_owned(),
+    ])
+}
+
+/// The columns of a log. Rows that repeat the row above are dropped if they hide the time, as erased memory does.
+fn columns_of(sheet: &mut Sheet) -> Columns {
+    let columns = Columns::find(sheet);
+    if columns.time.is_some() {
+        return columns;
+    }
+    let mut new = sheet.clone();
+    new.retain(|of, row| {
+        let is_new = |of: &Vec<f64>| of[row] != of[row - 1];
+        row == 0 || of.columns.iter().any(is_new)
+    });
+    let of_new = Columns::find(&new);
+    if of_new.time.is_none() {
+        return columns;
+    }
+    *sheet = new;
+    of_new
 }
 
 /// Keeps the rows of one of several instruments; returns the column and the number that identify it.
