@@ -1,6 +1,8 @@
 //! Report on the biases of an instrument at rest against temperature.
 
+use super::calibration::in_order;
 use super::calibration::temperature::{curves, hysteresis, orders};
+use super::values;
 use crate::prelude::*;
 use turncal::calibration::{AtRest, Calibration, MeanAtRest};
 use turncal::run::Run;
@@ -19,8 +21,10 @@ pub fn document(at_rest: &AtRest, run: &Run, calibration: &Calibration) -> Docum
         range.lowest,
         range.highest
     ));
-    document.warnings.items.extend(calibration.warnings.clone());
-    document.both(orders(outputs.form(), thermal));
+    document.verdict = values::verdict(calibration);
+    document.findings = in_order(&calibration.findings);
+    document.brief.push(values::table(calibration).into());
+    document.brief.push(orders(outputs.form(), thermal).into());
     document.both(hysteresis(outputs.form(), thermal));
     let changes = |index: usize| {
         let means = at_rest.means.iter().filter(|(bias, _)| *bias == index);

@@ -40,7 +40,9 @@ pub fn rounded(
         let without = with - part;
         let [without, with] = [&without, &with].map(|m| &m.as_slice()[of_triad.clone()]);
         let growth = largest_growth(without, with);
-        let steps = problem.runs().map(|run| run.recording.imu.resolution(sensor).max());
+        let steps = problem
+            .runs()
+            .map(|run| run.recording.imu.resolution(sensor).max());
         let (value, unit) = match sensor {
             Sensor::Gyro => (DEGREE, "°/s"),
             Sensor::Accel => (1.0, "m/s²"),
