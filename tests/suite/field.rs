@@ -541,6 +541,21 @@ fn the_filter_finds_the_truth_of_rebuilt_logs() {
     }
 }
 
+#[test]
+fn repeated_and_missing_rows_are_counted() {
+    if let Some(run) = file("r04-xio-400hz-duplicates-gaps", "run.toml") {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_turncal"));
+        let output = command.arg("check").arg(run).output().unwrap();
+        let text = String::from_utf8_lossy(&output.stdout);
+        for says in [
+            "244 rows are missing (first after line 2, 0.00 s)",
+            "205 rows are duplicated",
+        ] {
+            assert!(text.contains(says), "no `{says}` in {text}");
+        }
+    }
+}
+
 /// A full scale that is not the stated one: the draft measures the counts, a run that states another one is refused with
 /// the factor.
 #[test]

@@ -33,7 +33,9 @@ pub fn notes(imu: &ImuSamples) -> Vec<String> {
         } else {
             "in"
         };
-        let time = imu.time(first.samples.start);
+        let centiseconds = (100.0 * imu.time(first.samples.start)).round();
+        // Without the sign of a rounded negative time.
+        let time = centiseconds / 100.0 + 0.0;
         Some(format!(
             "{what} (first {place} line {}, {time:.2} s): {done}",
             first.line

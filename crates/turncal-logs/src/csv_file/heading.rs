@@ -436,11 +436,16 @@ impl Looks {
             };
             let width = kinds.values().next()?[0].len();
             let is_ragged = kinds.values().any(|rows| rows[0].len() != width);
+            // Each kind has its own time; a label of a movement leaves the time of all rows as it is.
+            let have_times = || {
+                let all: Vec<_> = rows().filter(|row| row.len() == width).collect();
+                !goes_on(&all) && kinds.values().all(|rows| goes_on(rows))
+            };
             let are_kinds = (2..=MOST_TAGS).contains(&kinds.len())
                 && 10 * of_kinds >= 9 * rows().count()
                 && (kinds.keys().all(is_word)
                     || are_digits && kinds.values().all(|rows| goes_on(rows)))
-                && (is_ragged || kinds.values().all(is_narrow));
+                && (is_ragged || kinds.values().all(is_narrow) || have_times());
             are_kinds.then(|| Tags {
                 column,
                 names: kinds.into_keys().map(str::to_owned).collect(),

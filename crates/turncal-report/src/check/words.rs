@@ -151,11 +151,11 @@ fn of_motion(survey: &Survey) -> Vec<String> {
             "Missing positions"
         };
         findings.push(format!(
-            "{positions}: {}. Only {} upward directions differ by {}° or more; without a table, the nine accelerometer \
-             parameters need all six positions or {DIRECTIONS} directions.",
+            "{positions}: {}. Upward directions {}° or more apart: {}. Without a table, the nine accelerometer parameters \
+             need all six positions or {DIRECTIONS} such directions.",
             missing.join(", "),
-            survey.directions,
-            degrees(APART)
+            degrees(APART),
+            survey.directions
         ));
     }
     findings
