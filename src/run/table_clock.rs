@@ -79,14 +79,15 @@ impl Line {
         let drift = match self.drift {
             [0.0, _] => String::new(),
             [drift, sigma] => format!(
-                ", and the clocks drift apart by {:.1} ± {:.1} ppm, which is in the σ of the gyro scale factors",
+                ", and the clocks drift apart by {:.1} ± {:.1} ppm, which is included in the σ of the gyro scale \
+                 factors",
                 drift / PPM,
                 sigma / PPM
             ),
         };
         format!(
-            "The gyros turn {:.3} ± {:.3} s {way} than the table in all {moves} moves{drift}. turncal put the table log on \
-             the clock of the IMU. Convert both logs to the same clock to avoid this.",
+            "The gyros turn {:.3} ± {:.3} s {way} than the table in all {moves} moves{drift}. turncal converted the \
+             times of the table log to the clock of the IMU. To avoid this step, convert both logs to the same clock.",
             offset.abs(),
             self.offset[1],
         )

@@ -36,7 +36,7 @@ const MEANINGS: [(&str, &str); 19] = [
         "one [[recording]] per run, with run = \"its run.toml\"",
     ),
     ("run", "the path of a run.toml"),
-    ("sigma", "the 1σ of each of its parameters"),
+    ("sigma", "the 1σ of each parameter of the term"),
     ("time", "a column name"),
     (
         "time_stamp",

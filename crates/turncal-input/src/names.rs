@@ -32,7 +32,8 @@ pub fn find(all: &[String], taken: &[usize], name: &str) -> Result<usize, [Strin
         [_, ..] => Err([
             format!("two columns named `{name}`"),
             "a unique name".to_owned(),
-            "Refer to it by its number (the first is `1`), or rename one of them.".to_owned(),
+            "Refer to the column by its number (the first is `1`), or rename one of the columns."
+                .to_owned(),
         ]),
         [] => {
             let advice = "Correct `columns` in run.toml or this header.";

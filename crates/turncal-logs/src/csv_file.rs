@@ -200,7 +200,7 @@ fn not_rows(file: &DataFile, lines: &Lines, is_labelled: bool) -> Option<FileErr
         ),
         0 => (
             "NUL bytes at its beginning",
-            "The log was not written, or its memory was erased: copy the log again.",
+            "The log was not written, or its memory was erased. Copy the log again.",
         ),
         _ => return None,
     };

@@ -92,7 +92,7 @@ impl Report<'_> {
             (None, _, unobserved) => (
                 Word::UseWithCare,
                 format!(
-                    "σ of {} of parameters is still more than half of the prior",
+                    "the σ of {} of parameters is still more than half of the prior",
                     several(unobserved, "combination")
                 ),
             ),
@@ -159,7 +159,7 @@ impl Report<'_> {
         };
         let columns = cells!["", "move", "s"].into_iter();
         let columns = columns.chain(Group::all().map(Group::short));
-        let mut table = Table::new("σ without each move, divided by σ with all moves", columns)
+        let mut table = Table::new("σ without each move, divided by the σ with all moves", columns)
             .section(self.evaluation.without.iter().enumerate().map(row))
             .note("A path without the move also lacks the dwell after it. Evaluate the shorter path before you use \
                 it.");

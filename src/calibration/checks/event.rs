@@ -229,8 +229,8 @@ impl EventKind {
                     Kind::Slipped,
                     format!(
                         "Before dwell {number} (at {time:.1} s) {what} by {angle}. turncal estimated this angle; the \
-                         misalignments refer to the mounting before that. Fasten the instrument and the table, and \
-                         repeat the recording"
+                         misalignments refer to the mounting before this event. Fasten the instrument and the table, \
+                         and repeat the recording"
                     ),
                 )
             }

@@ -188,7 +188,8 @@ pub fn inconsistent(innovations: &[Innovation], pulses: &[Observation]) -> Optio
         }
     }
     let text = format!(
-        "Residuals are not of the size that their σ predict. Relative to it they are: {}. Check {}.",
+        "The residuals do not have the size that their σ predict. Relative to the predicted size, they are: {}. Check \
+         {}.",
         each.join("; "),
         causes.join("; ")
     );

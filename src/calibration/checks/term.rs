@@ -113,9 +113,9 @@ fn estimated(shown: &[&TermEvidence]) -> Option<Finding> {
     });
     let names: Vec<String> = names.collect();
     let text = format!(
-        "The data show errors that scale factors, misalignments and biases cannot explain: {} (probability above \
-         99.9 %). turncal estimated these too, as with --with. Apply the calibration with `turncal apply`; exports \
-         without these terms leave their errors in.",
+        "The data show errors that scale factors, misalignments and biases cannot explain: {} (probability above 99.9 \
+         %). turncal estimated these error terms too, as if they had been given with --with. Apply the calibration \
+         with `turncal apply`; exports without these terms leave their errors in.",
         names.join(", ")
     );
     let finding = || Finding::new(Kind::ErrorTermEstimated, text, figures(shown));
@@ -134,8 +134,8 @@ fn not_shown(terms: &[&TermEvidence]) -> Option<Finding> {
     shown_by.sort_unstable();
     shown_by.dedup();
     let text = format!(
-        "This recording does not show these possible errors, which make σ larger: {}. Add {}, or use --with none \
-         if the sensor is known to have none of them.",
+        "This recording cannot show these possible errors, so they increase the σ: {}. Add {}, or use --with none if \
+         the sensor is known to have none of them.",
         each.join(", "),
         shown_by.join(", ")
     );

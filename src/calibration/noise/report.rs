@@ -180,7 +180,7 @@ fn noise_learnt(
     let lines: Vec<&String> = lines.iter().map(|(_, line)| line).collect();
     let text = format!(
         "Noise is larger than stated: {} (squared distance {ratio:.0}; limit {limit:.0}). turncal used its own \
-         estimate, and each σ includes it. To use this estimate for the next recording, state {}.",
+         estimate, which is included in every σ. To use this estimate for the next recording, state {}.",
         words.join("; "),
         tables.join("; ")
     );

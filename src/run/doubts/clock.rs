@@ -69,8 +69,9 @@ pub fn clock(run: &Run) -> Option<String> {
     if let Some(first) = others.next() {
         return Some(format!(
             "In {} of {} moves the gyros and the table turn by different angles. The first is at {:.1} s: the gyros \
-             measure {:.1}°, the table {:.1}°. Look for lost, repeated, clipped or wrapped rows there, or for logs \
-             from different runs or clocks. Otherwise check gyro_unit, scale and the unit of the table angles.",
+             measure {:.1}°, the table {:.1}°. Look for lost, repeated, clipped or wrapped rows in these moves, or for \
+             logs from different runs or clocks. If there are none, check gyro_unit, scale and the unit of the table \
+             angles.",
             1 + others.count(),
             moves.len(),
             first.time,
@@ -110,8 +111,8 @@ fn other_times(moves: &[Move], resolved: f64, period: f64) -> Option<String> {
     let (change, jump) = changes.max_by(|one, other| one.0.abs().total_cmp(&other.0.abs()))?;
     if change.abs() > 0.5 * (high - low) {
         return Some(format!(
-            "Between the moves at {:.1} s and {:.1} s the gyros start to turn {} than the table. Either {} about \
-             {:.0} rows there, or the table log jumps. Correct the wrong log.",
+            "Between the moves at {:.1} s and {:.1} s the gyros start to turn {} than the table. Either {} about {:.0} \
+             rows between these moves, or the table log jumps. Correct the wrong log.",
             jump[0].time,
             jump[1].time,
             by(change),
@@ -128,8 +129,8 @@ fn other_times(moves: &[Move], resolved: f64, period: f64) -> Option<String> {
     let at = |of: &Move| nanoseconds((of.time * 10.0).round() / 10.0);
     Some(format!(
         "The clocks of IMU and table drift apart by {:.0} ppm: the gyros turn {} than the table in the move at {} s, \
-         and {} in the move at {} s. Scale factors are wrong by the same amount. Check both logs for lost or repeated \
-         rows, and check sample_period_s and the time stamps.",
+         and {} in the move at {} s. The scale factors are wrong by the same amount. Check both logs for lost or \
+         repeated rows, and check sample_period_s and the time stamps.",
         apart / PPM,
         by(first.late),
         at(first),
@@ -150,7 +151,7 @@ fn scale(run: &Run, moves: &[Move]) -> Option<String> {
     (table > 0.0 && off.abs() > SIGMAS * sigma + sum(|m| m.zero) / table).then(|| {
         format!(
             "Over all {} moves the gyros turn {:.0} ppm {} than the table, but scale_sigma_ppm of [imu.prior.gyro] \
-             states {:.0} ppm. Check scale and scale_sigma_ppm there, and gyro_unit.",
+             states {:.0} ppm. Check scale and scale_sigma_ppm in this table, and gyro_unit.",
             moves.len(),
             off.abs() / PPM,
             if off > 0.0 { "more" } else { "less" },

@@ -40,8 +40,8 @@ fn gravity(run: &Run) -> Option<String> {
     (site.is_known && off.abs() > limit).then(|| {
         format!(
             "gravity_m_s2 = {} is {:.0} mGal {} normal gravity at latitude {}°, height {:.0} m (limit {:.0} mGal, \
-             false-alarm rate 0.1 %). This difference goes directly into the accelerometer scale factors. Check \
-             gravity_m_s2, latitude_deg and height_m.",
+             false-alarm rate 0.1 %). This difference changes the accelerometer scale factors by the same proportion. \
+             Check gravity_m_s2, latitude_deg and height_m.",
             value(site.gravity, 1e-4),
             off.abs() / MILLIGAL,
             if off > 0.0 { "above" } else { "below" },

@@ -199,7 +199,7 @@ fn read_in_background(source: PathBuf) -> anyhow::Result<Receiver<Option<Vec<u8>
                     return;
                 }
                 tell!(
-                    "{}: gone; waiting for it to return (Ctrl-C stops)",
+                    "{} has disappeared; waiting until it returns (Ctrl-C stops)",
                     source.display()
                 );
             }

@@ -192,7 +192,7 @@ impl Calibrate {
         let message = if self.truth.is_some() {
             "--truth applies to one run; to compare units of a lot with their truths, use turncal compare\n"
         } else if !self.require.is_empty() {
-            "--require applies to one run; for the units of a lot, give a --specification\n"
+            "--require applies to one run; for the units of a lot, use --specification\n"
         } else {
             return self.lot();
         };
@@ -363,10 +363,12 @@ impl Calibrate {
         calibration: Calibration,
     ) -> anyhow::Result<()> {
         if !solution.converged() {
-            bail!("{name}: not converged; do not use the values or σ, see the findings");
+            bail!(
+                "{name}: the calibration did not converge; do not use the values or σ, and see the findings"
+            );
         }
         if !solution.is_usable() {
-            bail!("{name}: do not use the values, see the findings");
+            bail!("{name}: do not use the values; see the findings");
         }
         self.check_required(name, &calibration)?;
         self.decide(name, calibration)

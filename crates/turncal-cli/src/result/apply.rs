@@ -63,7 +63,7 @@ impl Apply {
         let lost: usize = run.recording.imu.lost().iter().map(Range::len).sum();
         if let Some(missing) = run.recording.imu.missing().next().filter(|_| self.fill) {
             bail!(
-                "{}: {} rows are missing from {:.3} s on, too many to fill. Omit --fill, or split the log there",
+                "{}: {} rows are missing from {:.3} s on, too many to fill. Omit --fill, or split the log at this gap",
                 self.run.display(),
                 missing.len(),
                 run.recording.imu.time(missing.start)
@@ -173,8 +173,8 @@ fn notes(record: &Calibration, correction: &Correction, run: &Run) -> Vec<String
 fn of_temperature(thermal: &ThermalRecord, run: &Run) -> Vec<String> {
     let Some(temperature) = &run.recording.imu.temperature else {
         return vec![format!(
-            "the calibration depends on temperature, but the run has none: all rows are corrected for {} °C and have \
-             0 in in_range",
+            "the calibration depends on temperature, but the run has none: all rows are corrected for {} °C, and their \
+             column in_range is 0",
             thermal.range.gyro.reference
         )];
     };
@@ -185,7 +185,7 @@ fn of_temperature(thermal: &ThermalRecord, run: &Run) -> Vec<String> {
         is_beyond.then(|| {
             format!(
                 "{}: the run covers {lowest:.1} to {highest:.1} °C, but the calibration is valid for {:.1} to {:.1} \
-                 °C; rows outside have 0 in in_range",
+                 °C; for rows outside, the column in_range is 0",
                 sensor.name(),
                 range.lowest,
                 range.highest

@@ -165,8 +165,8 @@ impl Part {
         };
         let is_lot = part.job.job == JobKind::Lot;
         if part.digest != digest_of(&part.job) || !is_whole || (is_lot && !named) {
-            let found = "a job whose digest or run list does not match";
-            let expected = "the job as turncal wrote it";
+            let found = "a job file whose digest or run list does not match its content";
+            let expected = "the job file as turncal wrote it";
             return Err(FileError::of(&path, found, expected, advice));
         }
         Ok(part)

@@ -101,7 +101,10 @@ impl Parts {
         {
             let (run, other) = (self.name(*run), other.display());
             let found = format_args!("run {run}, which is also in {other}");
-            let (expected, advice) = ("each run in one part only", "Leave out one of the two.");
+            let (expected, advice) = (
+                "each run in one part only",
+                "Leave out one of the two parts.",
+            );
             return Err(FileError::of(directory, found, expected, advice));
         }
         let missing = self.job.runs.saturating_sub(held.len() as u64);

@@ -50,13 +50,13 @@ impl WholeDirectory {
             let mut needed = inputs.iter().copied().chain([here]);
             if let Some(held) = needed.find(inside) {
                 let found = if held == here {
-                    "the current directory in it".to_owned()
+                    "the current working directory inside it".to_owned()
                 } else {
                     format!("{} in it", held.display())
                 };
                 let expected = "a directory that can be replaced";
-                let advice = "Choose another name, because replacing this directory would delete files that are still \
-                    needed.";
+                let advice = "Choose another name, because replacing this directory would delete files that are in \
+                              use.";
                 return Err(FileError::of(target, found, expected, advice));
             }
             only_output(target)?;
@@ -122,8 +122,8 @@ fn only_output(directory: &Path) -> Result<(), FileError> {
         .map_err(|error| unwritable(directory, "list the directory", &error))?;
     foreign.map_or(Ok(()), |foreign| {
         let (name, list) = (foreign.display(), manifest::FILE);
-        let found = format!("`{name}` in it, which is not in turncal's list of its own files (`{list}`)");
-        let expected = "a directory with only files that turncal wrote";
+        let found = format!("the file `{name}` in it, which is not in turncal's list of its own files (`{list}`)");
+        let expected = "a directory that contains only files written by turncal";
         let advice = "Move this file elsewhere or choose another name, because replacing the directory would delete \
             the file.";
         Err(FileError::of(directory, found, expected, advice))

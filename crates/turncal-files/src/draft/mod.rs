@@ -130,8 +130,10 @@ impl Draft {
         let columns = &mut draft.columns;
         let PerSensor { gyro, accel } = columns.triads;
         if accel.is_none() || gyro.is_some() || columns.time.is_some() {
-            let expected = format!("at least {FEWEST_ROWS}, or the means of some positions");
-            let advice = "Record a run with dwells and turns, or give a table of accelerometer means, a row a position.";
+            let expected =
+                format!("at least {FEWEST_ROWS}, or the mean values of several positions");
+            let advice = "Record a run with dwells and turns, or give a table of accelerometer means with one row per \
+                          position.";
             return Err(FileError::of(file, found, expected, advice));
         }
         draft.of_means = true;
@@ -307,8 +309,11 @@ impl Draft {
             names.collect::<Vec<_>>().join(" ")
         });
         [
-            format!("gravity in {} and turns in {}", names.gyro, names.accel),
-            "rates and accelerations, as these columns are named".to_owned(),
+            format!(
+                "gravity in the columns {} and turns in the columns {}",
+                names.gyro, names.accel
+            ),
+            "rates and accelerations, according to the column names".to_owned(),
             "Exchange the two triads in the header of the log, or in columns of run.toml."
                 .to_owned(),
         ]

@@ -228,7 +228,7 @@ impl Streams {
         if let Some(damage) = self.damage.as_ref().filter(|_| self.written.is_none()) {
             let damage = one_line(&damage.to_string());
             imu.salvage = Some(true);
-            let why = format_args!("uncomment to use the intact part. {damage}");
+            let why = format_args!("uncomment this line to use the intact part. {damage}");
             remarks.open("imu.salvage", why);
         }
     }

@@ -67,13 +67,16 @@ impl Clock {
     pub fn find(sheet: &Sheet, columns: &mut Columns) -> Self {
         let stated = sheet.rate.map(f64::recip);
         let Some((column, stamps)) = columns.time.zip(columns.stamps(sheet)) else {
-            return Self::without(stated, "no column rises steadily, as times do");
+            return Self::without(stated, "no column increases steadily, as times do");
         };
         let steps = Steps::of(&stamps);
         let name = Name::of_column(&sheet.names[column], &sheet.units[column]);
         if name.is_counter() && name.is_time() < 2 && !steps.is_count {
             columns.time = None;
-            return Self::without(stated, "a counter shared with other packets is not a time");
+            return Self::without(
+                stated,
+                "a counter shared with other packets cannot serve as a time",
+            );
         }
         let second = |word: &str| units_of_time().find(|of| of.0 == word);
         let named = (name.unit).and_then(|unit| Some(unit.times * second(unit.word)?.1));
@@ -155,8 +158,9 @@ impl Clock {
             .filter(|_| self.unit != "count")
             .map(|step| rounded(period / step, 7));
         let doubt = format!(
-            "The clock of the log is doubtful: turns fit the unit of the gyros only if a row lasts {times} times as long as \
-             at {former} Hz ({}; {}). turncal used {rate} Hz{}. State --rate, or --gyro-unit if that is wrong.",
+            "The clock of the log is doubtful: turns fit the unit of the gyros only if a row lasts {times} times as \
+             long as at {former} Hz ({}; {}). turncal used {rate} Hz{}. State --rate, or --gyro-unit if the unit is \
+             wrong.",
             self.unit,
             self.why,
             tick.map_or(String::new(), |tick| format!(", a tick of {tick:?} s")),

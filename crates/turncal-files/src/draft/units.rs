@@ -59,7 +59,7 @@ impl Quantities {
         Self {
             output: Output::Rate,
             output_why: "as in most logs".to_owned(),
-            units: PerSensor::from_fn(|_| Unit::open("too few numeric rows to tell")),
+            units: PerSensor::from_fn(|_| Unit::open("there are too few numeric rows to decide")),
             opposed: false,
         }
     }
@@ -145,15 +145,16 @@ impl Quantities {
         self.output = output;
         self.output_why = match output {
             Output::Pulse => {
-                "integer counts whose remainder is carried into the next row, as in pulse outputs"
+                "the values are integer counts, and the remainder of each is carried into the next row, as in pulse \
+                 outputs"
                     .into()
             }
             Output::Increment => {
                 let period = rounded(rows.period, 4);
-                format!("specific force at rest is g times {period} s per row")
+                format!("the specific force at rest is g times {period} s per row")
             }
             Output::Rate => {
-                "specific force at rest is g itself, not g times the sample period".into()
+                "the specific force at rest is g itself, not g times the sample period".into()
             }
         };
     }
@@ -214,9 +215,9 @@ impl Quantities {
             }
             None if is_bare && self.output != Output::Pulse => {
                 return Unit::open(if rows.motion.is_turned {
-                    "too few usable turns of gravity to estimate it"
+                    "there are too few usable turns to estimate it"
                 } else {
-                    "gravity direction does not change, so it cannot be estimated"
+                    "the gravity direction does not change, so it cannot be estimated"
                 });
             }
             _ => {}

@@ -156,13 +156,14 @@ pub fn betaflight(values: &Values) -> Exported {
         gyro: Affine::offset(Vector3::zeros()),
         accel: Affine::offset(zero / per_unit),
     };
-    let notes = ["all gyro parameters, because it zeroes the gyros at every start"];
+    let notes = ["all gyro parameters, because Betaflight zeroes the gyros at every start"];
     let reads = ("#", "commands for its command line, from rad/s and m/s^2");
     let [x, y, z] = [zero.x, zero.y, zero.z].map(|count| count as i64);
     Remarks::of_program(values, reads, &program, &notes)
         .defines([
             of_counts("an accelerometer", COUNTS_PER_G, "g"),
-            "for a log recorded with acc_calibration = 0,0,0,0: Betaflight subtracts it before it logs".to_owned(),
+            "for a log recorded with acc_calibration = 0,0,0,0, because Betaflight subtracts this value before \
+             logging".to_owned(),
         ])
         .above(&format!("set acc_calibration = {x},{y},{z},1\nsave\n"))
 }
@@ -195,7 +196,7 @@ pub fn inav(values: &Values) -> Exported {
             of_counts("an accelerometer", COUNTS_PER_G, "g"),
             of_counts("gyros", COUNTS_PER_RAD_S, "rad/s"),
             "for a log recorded with acczero and gyro_zero = 0, accgain = 4096 and init_gyro_cal = OFF: INAV applies \
-             them before it logs"
+             these values before logging"
                 .to_owned(),
         ])
         .above(&(text + "set init_gyro_cal = OFF\nsave\n"))

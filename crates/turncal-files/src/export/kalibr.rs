@@ -16,8 +16,8 @@ use turncal::units::ARCSEC;
 
 /// Quantities that Kalibr and OpenVINS estimate themselves.
 const BIASES: &str =
-    "biases, which it estimates itself, so they leave no error; a comment lists them";
-const TOPIC: &str = "rostopic of your recording, which you must write in place of /imu0";
+    "the biases, which Kalibr estimates itself, so no error remains; a comment lists their values";
+const TOPIC: &str = "the rostopic of your recording, which you must write in place of /imu0";
 
 /// From true to measured, in rad/s and m/s²: `a = M_a C_i_b f + b_a`,
 /// `ω = M_g C_gyro_i C_i_b ω_b + A C_gyro_i C_i_b f + b_g`, with both `M` lower triangular and both `C` rotations.
@@ -76,7 +76,9 @@ fn configuration<'a>(values: &'a Values<'a>, program: &str, indent: &str) -> (St
         key(format!("{name}_noise_density"), triad.density(), &density);
         let (walk, is_usual) = triad.varying().unzip();
         let usual = match is_usual {
-            Some(true) => ", usual for this noise density; measure it with `turncal allan`",
+            Some(true) => {
+                ", the usual value for this noise density; measure it with `turncal allan`"
+            }
             _ => "",
         };
         let unit = format!("{unit}/s/sqrt(Hz){usual}");

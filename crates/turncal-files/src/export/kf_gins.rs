@@ -32,7 +32,8 @@ pub fn write(values: &Values) -> Exported {
              too much, give KF-GINS the output of `turncal apply` with zero bias and scale"
         ),
         "sigma of misalignment, and covariance; they are in calibration.json",
-        "gsstd and asstd of imunoise, which KF-GINS requires: variation of scale factors in ppm, from the data sheet",
+        "gsstd and asstd of imunoise, which KF-GINS requires: the variation of the scale factors in ppm, from the data \
+         sheet",
     ];
     let PerSensor { gyro, accel } = &values.triads;
     let error = |triad: &Normalised| triad.sensitivity.diagonal().add_scalar(-1.0);

@@ -59,7 +59,8 @@ const fn row(
 
 /// Temperature dependence that autopilots cannot represent.
 const IN_AUTOPILOTS: &str = "change of scale factors and misalignments with temperature, change of biases with \
-    temperature rate, and orders above three; biases refer to the temperature of the sensor";
+                             temperature rate, and orders above three; the biases refer to the temperature of the \
+                             sensor";
 
 /// Every format.
 #[rustfmt::skip]

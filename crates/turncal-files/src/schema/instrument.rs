@@ -247,7 +247,8 @@ impl<'a> Fields<'a> {
         match (of.prior.scale.map(OneOrThree::vector), of_unit) {
             (None, Some(of_unit)) => Ok(Vector3::repeat(of_unit)),
             (None, None) => {
-                let meaning = "the counts per second for 1 rad/s or 1 m/s², because the size of a count varies by instrument";
+                let meaning = "the counts per second for 1 rad/s or 1 m/s², because the size of a count depends on the \
+                               instrument";
                 Err(document.missing(&path, meaning))
             }
             (Some(scale), _) if scale.iter().any(|&s| s == 0.0) => {

@@ -185,8 +185,9 @@ impl InstrumentFields<'_> {
         }
         if imu.is_of_means() {
             notes.push(format!(
-                "The rows are the means of {} positions, and their noise is not known. turncal assumed {}, that of a \
-                 second of a MEMS sensor. State velocity_random_walk_ug_per_sqrt_hz for rows of one second if you know it.",
+                "The rows are the means of {} positions, and their noise is not known. turncal assumed {}, the noise \
+                 of a MEMS sensor averaged over one second. If you know the noise, state \
+                 velocity_random_walk_ug_per_sqrt_hz for rows of one second.",
                 imu.len(),
                 found.join(", ")
             ));
@@ -211,7 +212,7 @@ impl InstrumentFields<'_> {
         let Some(period) = angle.filter(|&period| period > 0.0) else {
             return Err(FileError::of(
                 &self.log.source.file,
-                "rows without time stamps, and turns that are not good enough to estimate the sample period",
+                "rows without time stamps, and no turns from which the sample period can be estimated",
                 "a time column or sample_period_s in run.toml",
                 "State sample_period_s (--rate).",
             ));

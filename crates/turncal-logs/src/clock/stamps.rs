@@ -350,7 +350,7 @@ impl Stamps {
         csv.error_here(
             format_args!("a time that steps back from {from} to {to}"),
             "increasing times",
-            "Sort the rows, name another time column, or split the file where the clock was set.",
+            "Sort the rows, name another time column, or split the file at the line where the clock was set.",
         )
     }
 
@@ -423,8 +423,8 @@ impl Stamps {
             TimeUnit::Count => (missing > 0).then(|| {
                 format!(
                     "Rows are missing, and the counter wraps every {} samples ({} s). Each gap may be longer by one or \
-                        more of these periods; all later times are then too early by as much. Use a time that does not \
-                        wrap, or split the recording at the gaps.",
+                     more of these periods, and all later times would then be too early by the same amount. Use a time \
+                     that does not wrap, or split the recording at the gaps.",
                     (size / self.period()).round(),
                     nanoseconds(size)
                 )

@@ -384,7 +384,7 @@ impl Looks {
             None if !is_near => numbered(first),
             None if has_numbers => Named {
                 cut: Some(format!(
-                    "Line {} has {} fields, the rows below it have {columns}. turncal left it out.",
+                    "Line {} has {} fields, but the rows below it have {columns}. turncal left this line out.",
                     look.number,
                     fields.len()
                 )),
@@ -463,7 +463,7 @@ fn clocks(rows: &[Vec<String>], columns: usize) -> Vec<Option<ClockText>> {
 fn orientation(says: &[&str]) -> Option<String> {
     let letters = value(says, "orientation")?;
     Some(format!(
-        "turncal did not apply the orientation {letters} that the file states; the columns were used unchanged."
+        "turncal did not apply the orientation {letters} that the file states; it used the columns unchanged."
     ))
 }
 

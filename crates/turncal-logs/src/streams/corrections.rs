@@ -142,7 +142,8 @@ fn words(program: &str, sensor: Sensor, applied: Option<&Applied>) -> String {
             of.name
         ),
         None => format!(
-            "{program} corrects its {triad}; the log does not state the correction, so its values are used unchanged."
+            "{program} corrects its {triad}; the log does not state the correction, so turncal used the values \
+             unchanged."
         ),
     }
 }

@@ -37,7 +37,7 @@ pub fn figures(accuracy: &Accuracy) -> [Plot; 2] {
         ),
         Plot::new("gain.svg", "Gain over the closed form", (1, 460), [gain]).caption(format!(
             "RMS error of the closed form divided by the RMS error of the EKF in {filter}, with 99 % intervals. Above \
-             the line at 1 the EKF is better; below, the closed form.",
+             the line at 1, the EKF is better; below the line, the closed form is better.",
         )),
     ]
 }

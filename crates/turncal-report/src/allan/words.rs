@@ -14,20 +14,21 @@ const SMALL: f64 = 0.02;
 fn left_out(of: &Identified, taus: &[f64]) -> Option<String> {
     let from = taus.get(of.first).filter(|_| of.first > 0)?;
     Some(format!(
-        "no process fits its deviations below {}, because of pulses coarser than the noise or the sensor bandwidth. \
-         The coefficients use the longer cluster times.",
+        "no process fits its deviations below {}, because the pulses are coarser than the noise or the bandwidth of \
+         the sensor is limited. The coefficients use the longer cluster times.",
         duration(*from)
     ))
 }
 
 pub const METHOD: &str = "Overlapping Allan variance of the rate (NIST SP 1065, 5.2.4) at two cluster times per \
-    octave. Coefficients: non-negative generalised least-squares fit of the variances as a sum of processes (IEEE \
-    Std 952, annex C; El-Sheimy, Hou, Niu 2008). The weights are the covariance of the points under these processes, \
-    from their generalised autocovariances (Greenhall, Riley 2003), which also give the equivalent degrees of \
-    freedom. turncal selects the most likely combination; each process must raise twice the log-likelihood by 9 \
-    (3σ), and a correlation time by 4 more. Short cluster times that no combination fits (pulses coarser than the \
-    noise, or sensor bandwidth) are excluded. Bias instability B is the coefficient of flicker noise, whose floor is \
-    0.664 B.";
+                          octave. Coefficients: non-negative generalised least-squares fit of the variances as a sum \
+                          of processes (IEEE Std 952, annex C; El-Sheimy, Hou, Niu 2008). The weights are the \
+                          covariance of the points under these processes, from their generalised autocovariances \
+                          (Greenhall, Riley 2003), which also give the equivalent degrees of freedom. turncal selects \
+                          the most likely combination; each process must raise twice the log-likelihood by 9 (3σ), and \
+                          a correlation time by 4 more. Short cluster times that no combination fits, because of \
+                          coarse pulses or a limited sensor bandwidth, are excluded. Bias instability B is the \
+                          coefficient of flicker noise, whose floor is 0.664 B.";
 
 /// Warnings about the figures.
 pub fn warnings(analysis: &NoiseAnalysis) -> Vec<String> {

@@ -22,7 +22,7 @@ impl Report<'_> {
                            determined); scale factors as deviation from nominal. Bands: prior mean ±1σ."
             .to_owned();
         if self.specification.is_some() {
-            caption += " Dashed: limits of the specification; a prior may extend beyond the axes.";
+            caption += " Dashed: limits of the specification. The bar of a prior may extend beyond the axes.";
         }
         let heading = "Values with their uncertainty";
         Plot::new("values.svg", heading, (3, 270), panels).caption(caption)

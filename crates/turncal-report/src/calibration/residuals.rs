@@ -49,7 +49,7 @@ pub fn figure(quality: &Quality) -> Plot {
     .caption(
         "|f| − gravity: deviation of the mean specific force of each dwell from gravity. Direction: angle, after each \
          move, between the vertical carried over from the previous dwell by the gyros and the vertical measured by the \
-         accelerometers. Crosses: the nominal instrument, without calibration. Dots: the calibrated instrument. Rings: \
-         an instrument calibrated without that dwell.",
+         accelerometers. Crosses: the instrument with nominal parameters, before calibration. Dots: the calibrated \
+         instrument. Rings: the instrument calibrated without this dwell.",
     )
 }

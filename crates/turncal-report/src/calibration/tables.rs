@@ -67,7 +67,8 @@ pub fn weakest(outcome: &Outcome) -> Table {
         .section(rows.map(|of| vec![of.words.clone(), improvement(1.0, of.remaining)]))
         .note(
             "Combinations of parameters, each in units of its prior σ, that the data determine independently of each \
-             other. “With” joins errors of the same sign, “against” errors of opposite sign.",
+             other. “With” joins parameters whose errors have the same sign, “against” parameters whose errors have \
+             opposite signs.",
         )
 }
 

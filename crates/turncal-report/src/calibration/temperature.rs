@@ -76,8 +76,8 @@ pub fn orders(form: InstallationForm, thermal: &Thermal) -> Table {
             rows.filter_map(|i| row(group, i)).collect::<Vec<_>>()
         }))
         .note(format!(
-            "Legendre coefficients ± 1σ over {ranges}: change of the parameter over half the range. Each order is \
-             averaged over its absence and its usual sizes."
+            "Legendre coefficients ± 1σ over {ranges}: each is the change of the parameter over half the range. Each \
+             order is averaged over its absence and its usual sizes."
         ))
 }
 
@@ -192,7 +192,7 @@ fn differences(outcome: &Outcome) -> Table {
     )
     .section(rows)
     .note(
-        "Spread: standard deviation of the single-recording estimates about the common curve; by σ alone: value \
+        "Spread: standard deviation of the single-recording estimates about the common curve; by σ alone: the spread \
          expected from their σ. If χ²/n exceeds its limit, the instrument does not repeat; state the difference in \
          [day_to_day].",
     )

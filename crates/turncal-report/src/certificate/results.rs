@@ -164,7 +164,7 @@ pub fn temperature_words(of: &ThermalRecord, number: impl Fn(f64) -> String) -> 
     };
     let triads = [("gyros", Sensor::Gyro), ("accelerometers", Sensor::Accel)].map(triad);
     format!(
-        "The results apply at the reference temperature: {}. They change with temperature; the attached \
+        "The results apply at the reference temperature: {}. The results change with temperature; the attached \
          calibration.json contains the coefficients with their equation and covariance.",
         triads.join("; ")
     )

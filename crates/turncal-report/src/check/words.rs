@@ -134,8 +134,8 @@ fn of_motion(survey: &Survey) -> Vec<String> {
     if survey.rests.len() < 2 {
         findings.push(format!(
             "The recording has fewer than two dwells. Keep the instrument stationary for {LONG_ENOUGH} s or more \
-             between turns. If the instrument was stationary, bias_sigma of the gyros or the noise in run.toml is too \
-             small: check both."
+             between turns. If the instrument was stationary, check bias_sigma of the gyros and the noise in run.toml: \
+             one of them is too small."
         ));
         return findings;
     }

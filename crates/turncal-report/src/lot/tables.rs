@@ -316,7 +316,7 @@ pub fn limits(lot: &Lot) -> Table {
     Table::new(heading, columns("unit | | unit | from nominal | limit | P(within) | verdict"))
         .section(rows)
         .note(
-            "A unit passes a limit if the probability of being within it is at least the stated confidence, and fails \
-             if the probability of being outside is.",
+            "A unit passes a limit if the probability of being within the limit is at least the stated confidence, and \
+             fails if the probability of being outside is at least the stated confidence.",
         )
 }

@@ -46,8 +46,8 @@ pub fn add(document: &mut Document, navigation: Result<&[MethodOutlook], &Naviga
         Ok([]) => {}
         Ok(navigated @ [.., last]) => {
             let how = format!(
-                "{} stationary and level at the site of the run, heading North, from perfect alignment, height \
-                 fixed, for as long as predicted errors stay small (1° and 1 % of the Earth's radius).",
+                "{} stationary and level at the site of the run, heading North, from perfect alignment, height fixed, \
+                 as long as the predicted errors stay small (below 1° and 1 % of the Earth's radius).",
                 long(navigated)
             );
             document.page(table(HEADING, navigated).note(how));

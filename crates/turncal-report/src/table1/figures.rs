@@ -42,7 +42,7 @@ fn caption(table: &Table1, column: &Column) -> String {
     };
     format!(
         "{}, as stated. Thin: errors of {samples}; thick: mean of all; dashed: mean ± one standard deviation. Both \
-         forms of a triad have the same axes.",
+         forms of a triad are drawn with the same axes.",
         title(column.published)
     )
 }

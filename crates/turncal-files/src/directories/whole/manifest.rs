@@ -11,8 +11,8 @@ use turncal_input::small_file;
 /// The list's name in its directory.
 pub const FILE: &str = ".turncal";
 
-const FIRST_LINE: &str = "turncal-output/1: turncal wrote the files listed here; --force replaces this directory \
-    only if it contains nothing else";
+const FIRST_LINE: &str = "turncal-output/1: turncal wrote the files listed here; --force replaces this directory only \
+                          if it contains no other files";
 
 /// The list of all entries of a directory.
 pub fn of_all(directory: &Path) -> io::Result<String> {

@@ -78,12 +78,12 @@ impl Hypothesis {
         };
         match (sensor, self.fits()) {
             (Sensor::Accel, true) => format!("{} at rest", rounded(motion.gravity, 4)),
-            (Sensor::Accel, false) => format!("magnitude at rest is {factor} times gravity"),
+            (Sensor::Accel, false) => format!("the magnitude at rest is {factor} times gravity"),
             (Sensor::Gyro, true) => {
                 "integrated gyro angles match the change of gravity direction".to_owned()
             }
             (Sensor::Gyro, false) => {
-                format!("gravity direction changes by {factor} times the integrated gyro angle")
+                format!("the gravity direction changes by {factor} times the integrated gyro angle")
             }
         }
     }
