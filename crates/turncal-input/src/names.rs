@@ -1,4 +1,4 @@
-//! Column names, each for one quantity.
+//! Column names, each of which may be used for one quantity only.
 
 use super::error::{choice, excerpt, nearest};
 
@@ -7,7 +7,7 @@ use super::error::{choice, excerpt, nearest};
 pub struct FileColumn {
     /// Name in the file; empty if the triad was not recorded.
     pub name: String,
-    /// Whether its values are read with the sign reversed.
+    /// Whether the values of the column are read with the sign reversed.
     pub reversed: bool,
 }
 

@@ -34,7 +34,7 @@ pub struct Estimation {
 }
 
 impl Estimation {
-    /// Exits if arguments exclude each other.
+    /// Exits if two arguments exclude each other.
     pub fn check(&self) {
         With::check(&self.with);
         let first = With::terms(&self.with).next();
@@ -82,7 +82,7 @@ impl Estimation {
         Ok(problem)
     }
 
-    /// The options, without checks that need a run.
+    /// The options, without the checks that need a run.
     pub fn options(&self) -> Options {
         Options {
             form: self.installation,

@@ -450,7 +450,7 @@ fn say(recording: &Recording) {
     }
 }
 
-/// Solves a problem and shows the passes.
+/// Solves a calibration problem and shows each pass.
 pub fn solve(problem: &Problem, method: Method, activity: &Activity) -> anyhow::Result<Solution> {
     let name = &problem.run().recording.name;
     activity.next(format!("calibrating {name}"));

@@ -1,4 +1,4 @@
-//! `turncal compare`: calibrations side by side.
+//! `turncal compare`: comparison of calibrations.
 
 use std::path::{Path, PathBuf};
 

@@ -95,7 +95,7 @@ impl LotDirectory {
         Ok(Self { root, _lock })
     }
 
-    /// The previously calibrated unit, if its inputs are unchanged.
+    /// The unit from an earlier run, if it was calibrated with the same inputs.
     pub fn kept(&self, name: &str, key: &str) -> Option<Unit> {
         let unit = read_unit(&self.root.join(UNITS).join(name), Some(key));
         Some(unit.ok()?.0)

@@ -1,4 +1,4 @@
-//! Output that is complete or absent: written next to its target, then renamed.
+//! Output that is complete or absent: it is written next to its target and then renamed.
 //!
 //! A process that ends on a signal removes unfinished output ([`Unfinished`]); leftovers of a killed process
 //! are removed when the next output is started there.
@@ -17,7 +17,7 @@ pub use stage::Unfinished;
 use stage::{Stage, taken, unwritable};
 use turncal_input::FileError;
 
-/// A directory under construction. Dropped without [`Self::commit`], it leaves nothing behind.
+/// A directory under construction. If it is dropped without [`Self::commit`], no file remains.
 pub struct WholeDirectory {
     stage: Stage,
     force: bool,
@@ -97,8 +97,8 @@ impl WholeDirectory {
     }
 }
 
-/// Writes the list of a growing directory, according to which only these names belong to turncal; entries that end in
-/// `/` have their own list. Files named only in the previous list are deleted.
+/// Writes the list of a growing directory, which states that only these names belong to turncal. Entries that end in
+/// `/` are directories with their own list. Files named only in the previous list are deleted.
 pub fn list_anew(directory: &Path, names: &[&str]) -> Result<(), FileError> {
     for old in manifest::listed_files(directory) {
         let still = |name: &&str| old.file_name() == Some(name.as_ref());
@@ -130,7 +130,7 @@ fn only_output(directory: &Path) -> Result<(), FileError> {
     })
 }
 
-/// Writes a complete file or none; an existing file is replaced only with `force`, a directory never.
+/// Writes a complete file or none. An existing file is replaced only with `force`; a directory is never replaced.
 pub fn write_whole(path: &Path, bytes: &[u8], force: bool) -> Result<(), FileError> {
     write_whole_with(path, force, |mut file| file.write_all(bytes))
 }

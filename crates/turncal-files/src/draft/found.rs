@@ -23,7 +23,7 @@ pub struct Found {
 }
 
 impl Draft {
-    /// Detected fields, in display order.
+    /// All detected fields, in the order of the display.
     pub fn found(&self) -> Vec<Found> {
         vec![
             self.time_found(),

@@ -42,7 +42,7 @@ const FEWEST_AT_REST: usize = 64;
 const NO_COLUMNS: &str = "not recognised by name or values";
 const AXES_OF_PROGRAM: &str = "axis convention of the program that wrote the log";
 
-/// Information in a log about the instrument and its recording.
+/// Information about the instrument and its recording, found in a log.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Draft {
     /// Content of the streams, if the log has streams.
@@ -78,7 +78,7 @@ impl Draft {
     /// Examines a file of rows.
     ///
     /// # Errors
-    /// [`FileError`] if it cannot be read or has too few rows.
+    /// [`FileError`] if the file cannot be read or has too few rows.
     pub fn of_file(path: &Path) -> Result<Self, FileError> {
         Self::of_stream(&path.into(), None, &Stated::default())
     }
@@ -86,7 +86,7 @@ impl Draft {
     /// Examines one stream of a log, with statements about it.
     ///
     /// # Errors
-    /// [`FileError`] if it cannot be read or has too few rows.
+    /// [`FileError`] if the file cannot be read or has too few rows.
     pub fn of_stream(
         file: &DataFile,
         stream: Option<&str>,
@@ -140,16 +140,16 @@ impl Draft {
         Ok(draft)
     }
 
-    /// Whether the gravity direction stays the same, as in the log of one position.
+    /// Whether the gravity direction does not change, as in the log of one position.
     pub fn is_of_one_position(&self) -> bool {
         let stays = |motion: &Motion| !motion.is_turned && motion.cuts.is_empty();
         self.motion.as_ref().is_some_and(stays)
     }
 
-    /// Takes the units of another log of the same sensor.
+    /// Takes over the units of another log of the same sensor.
     ///
     /// # Errors
-    /// [`FileError`] if the columns are not those of the other log.
+    /// [`FileError`] if the columns differ from those of the other log.
     pub fn as_in(&mut self, file: &Path, other: &Self) -> Result<(), FileError> {
         let names = |of: &Self| of.columns.names.join(", ");
         if self.columns.names != other.columns.names {
@@ -167,7 +167,7 @@ impl Draft {
         Ok(())
     }
 
-    /// Leaves out gyros whose unit nothing shows: gravity alone calibrates the accelerometers.
+    /// Leaves out the gyros if nothing shows their unit; the accelerometers are then calibrated with gravity alone.
     pub fn leave_out_gyros(&mut self) {
         let knows = |sensor| self.quantities.units.get(sensor).word.is_some();
         if !knows(Sensor::Gyro) && knows(Sensor::Accel) && self.columns.triads.accel.is_some() {
@@ -179,7 +179,7 @@ impl Draft {
     /// in the draft.
     ///
     /// # Errors
-    /// [`FileError`] if a file cannot be read, has too few rows, or lacks its triad or its time.
+    /// [`FileError`] if a file cannot be read, has too few rows, or lacks its triad or a time.
     pub fn of_two_files(
         gyro: &DataFile,
         accel: &DataFile,

@@ -1,4 +1,5 @@
-//! Prior: scale and bias from the recording; the rest is typical of instruments with similar noise.
+//! The prior of a draft: scale and bias are estimated from the recording, and the other values are typical of
+//! instruments with similar noise.
 
 use nalgebra::Vector3;
 

@@ -1,5 +1,5 @@
-//! The clock after all that tells the rate is held against each other: stamps in their unit, the stated rate, the rate in
-//! the preamble, and turns in the unit of the gyros.
+//! The clock of a log, chosen by comparing all evidence about the rate: the time stamps in their unit, the stated rate,
+//! the rate in the preamble, and turns in the unit of the gyros.
 
 use super::columns::Columns;
 use super::motion::{FOLLOWED, Motion};
@@ -27,7 +27,7 @@ fn are_near(one: f64, other: f64, factor: f64) -> bool {
 }
 
 impl Rates<'_> {
-    /// The rows of a clock.
+    /// The rows to which a clock applies.
     pub fn rows(&self, clock: &Clock) -> Option<RawSamples> {
         let (numbers, triads) = self.columns.samples(self.sheet)?;
         let period = clock.period.unwrap_or(USUAL_PERIOD);
@@ -35,8 +35,8 @@ impl Rates<'_> {
         Some(RawSamples::new(triads, breaks, period))
     }
 
-    /// The clock that most statements allow, with a doubt if one of the file is given up; and the evidence against a
-    /// statement of the user, the statement and the remedy.
+    /// Returns the clock that agrees with most statements, with a doubt if a statement of the file was rejected. Also
+    /// returns the evidence against a statement of the user, with the statement and the remedy.
     pub fn agreed(&self, clock: Clock) -> (Clock, Option<[String; 3]>) {
         let told = clock.period.zip(self.shown(&clock));
         let contradiction = (self.stated.rate_hz).and_then(|rate| clock.contradiction(rate));

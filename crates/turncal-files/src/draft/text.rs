@@ -293,7 +293,7 @@ impl Draft {
         }
     }
 
-    /// Why the triads that were identified by value are a guess, and what to check.
+    /// Why triads identified by their values are only a guess, and what to check.
     pub fn doubt_words(&self, doubt: &Doubt) -> String {
         match doubt {
             Doubt::Order(order) => {
@@ -378,7 +378,7 @@ impl Draft {
         priors
     }
 
-    /// White noise of a triad, stated or at rest, (rad/s)√s or (m/s²)√s.
+    /// White noise of a triad, as stated or as measured at rest, in (rad/s)√s or (m/s²)√s.
     pub fn white_noise(&self, sensor: Sensor) -> Option<f64> {
         if let Some(noise) = &self.stated.noise {
             return Some(noise.get(sensor).random_walk);

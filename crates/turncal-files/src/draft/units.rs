@@ -28,7 +28,7 @@ pub struct Unit {
     pub why: String,
     /// Whether the unit is confirmed by motion or stated by the user.
     pub is_shown: bool,
-    /// Whether rows that are not whole numbers fit no known unit.
+    /// Whether the rows are not whole numbers and fit no known unit.
     pub is_unfit: bool,
     /// Scale of counts, if determined.
     pub scale: Option<Scale>,
@@ -43,7 +43,7 @@ impl Unit {
     }
 }
 
-/// Quantity of the rows.
+/// Quantity in the rows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Quantities {
     pub output: Output,
@@ -54,7 +54,7 @@ pub struct Quantities {
 }
 
 impl Quantities {
-    /// The quantities if there are too few numeric rows.
+    /// The quantities to assume if there are too few numeric rows.
     pub fn unknown() -> Self {
         Self {
             output: Output::Rate,
@@ -304,7 +304,8 @@ impl Quantities {
         self.units.get(sensor).word == Some("count")
     }
 
-    /// The period for which turns fit the unit of the gyros, stated, in the file or found; for rates.
+    /// For rates: the sample period for which the turns fit the unit of the gyros, whether this unit is stated, named
+    /// in the file or detected.
     pub fn turned_period(
         &self,
         stated: &Stated,
@@ -321,7 +322,7 @@ impl Quantities {
         Some(angle.abs() * per_si)
     }
 
-    /// Factor that converts rows to rates.
+    /// Factor that converts row values to rates.
     pub fn per_second(&self, period: f64) -> f64 {
         match self.output {
             Output::Rate => 1.0,

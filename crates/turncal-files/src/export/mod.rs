@@ -30,9 +30,9 @@ use values::Values;
 pub struct Format {
     /// Name on the command line.
     pub name: &'static str,
-    /// Extension of its files.
+    /// Extension of the files in this format.
     pub extension: &'static str,
-    /// Programs that read it.
+    /// Programs that read this format.
     pub about: &'static str,
     axes: Axes,
     write: fn(&Values) -> Exported,
@@ -102,7 +102,7 @@ impl Format {
 /// scales by which counts are divided, for formats in rad/s and m/s².
 ///
 /// # Errors
-/// If the calibration has no inverse or an unknown term, or does not belong to the instrument of the run.
+/// If the calibration has no inverse, contains an unknown term, or does not belong to the instrument of the run.
 pub fn write(
     record: &Calibration,
     format: &Format,

@@ -1,4 +1,4 @@
-//! The memory of a RealSense D400 camera, which calibrates its output itself.
+//! The calibration memory of a RealSense D400 camera, which corrects its output itself.
 //!
 //! Source: librealsense, `tools/rs-imu-calibration/rs-imu-calibration.py`; `src/ds/ds-calib-parsers.cpp`,
 //! `dm_v2_imu_calib_parser::get_intrinsic`.

@@ -26,9 +26,9 @@ const NOISE_OF_MEANS: f64 = 300.0 * MICRO_G_PER_SQRT_HZ;
 
 /// Reads `run.toml` and the files given in it, relative to itself.
 ///
-/// Everything is checked: known fields, finite and possible numbers, uniform time, overlapping files. Samples,
-/// nominal scales and priors are returned along right-front-up for any `body_axes`. Unstated site, noise, period
-/// and prior get wide defaults, with a note.
+/// Everything is checked: known fields, finite and possible numbers, uniform time, overlapping files. Samples, nominal
+/// scales and priors are returned along right-front-up for any `body_axes`. If the site, noise, period or prior is not
+/// stated, it gets a wide default, with a note.
 pub fn read_run(path: &Path) -> Result<Run, FileError> {
     run_of_text(path, &text_of(path)?, Some(path), &[])
 }

@@ -40,7 +40,7 @@ impl Clock<'_> {
 /// Position of a row by its stamp: number of kept rows before it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stamp {
-    /// The row is kept, after this number of kept rows.
+    /// The row is kept; this many kept rows precede it.
     New(usize),
     /// The stamp equals that of the previous row.
     Again(usize),
@@ -97,7 +97,7 @@ pub struct Stamps {
 }
 
 impl Stamps {
-    /// A copy for which times must be unique.
+    /// Returns a copy that requires unique times.
     pub fn without_bursts(self) -> Self {
         Self {
             bursts: false,
@@ -105,7 +105,7 @@ impl Stamps {
         }
     }
 
-    /// Accepts the row unless it duplicates a row at its time; `is_same` compares the values.
+    /// Accepts the row unless it duplicates a row with the same time; `is_same` compares the values.
     pub fn take(
         &mut self,
         csv: &LogRows,
@@ -315,7 +315,7 @@ impl Stamps {
         });
     }
 
-    /// Sample time for this logged time, with shortened pauses.
+    /// Sample time for this logged time, after pauses have been shortened.
     pub fn told(&self, time: f64) -> f64 {
         // Samples begin about where their stamps are.
         let behind = |pause: &Pause| pause.until - 0.5 * BREAK <= time;

@@ -1,4 +1,4 @@
-//! The tables, the same for terminal and page.
+//! The tables, which are the same on the terminal and on the page.
 
 use crate::prelude::*;
 use crate::terms::{title, unit};
@@ -59,7 +59,7 @@ pub fn bound(accuracy: &Accuracy) -> Table {
                runs.")
 }
 
-/// Auxiliary parameters, term by term.
+/// Table of the auxiliary parameters, term by term.
 pub fn auxiliary(accuracy: &Accuracy) -> Table {
     let row = |(term, of): &(ErrorTerm, Figures)| {
         let (unit, in_si) = unit(*term);
@@ -142,7 +142,7 @@ fn nis_row(name: &str, nis: &Nis) -> Vec<String> {
     ]
 }
 
-/// Actual and expected fraction of errors in a region.
+/// Actual and expected fraction of the errors that are within a region.
 pub fn held(of: &Containment) -> String {
     let percent = |share: f64| value(100.0 * share, 1.0);
     let found = percent(of.within as f64 / of.runs as f64);

@@ -92,7 +92,7 @@ fn axis(axis: &AxisNoise, sensor: Sensor) -> Value {
 /// A field of `[imu.noise]`: key, value, and a comment or nothing.
 type Field = (&'static str, f64, String);
 
-/// `[imu.noise]` with all detected processes, ready to paste.
+/// `[imu.noise]` with all detected processes, ready to be pasted into run.toml.
 pub fn noise_table(analysis: &NoiseAnalysis) -> String {
     let mut text = "[imu.noise]\n".to_owned();
     for &sensor in &analysis.sensors {

@@ -109,7 +109,7 @@ fn unlike(triad: &TriadNoise, sensor: Sensor) -> Option<String> {
     })
 }
 
-/// For each undetected slope of a triad: its upper limit, and how to measure it.
+/// For each slope of a triad that was not detected: its upper limit, and how to measure it.
 pub fn advice(analysis: &NoiseAnalysis) -> Vec<String> {
     let mut sentences = Vec::new();
     for &sensor in &analysis.sensors {

@@ -188,8 +188,7 @@ pub fn methods(survey: &Survey) -> Table {
     let heading = "What each method could observe, 1σ";
     let mut table = Table::new(heading, group_columns("")).note(
         "Predicted 1σ in the general form (RMS per group), from the prior σ and a linearisation at the filter start; \
-         for the closed form, from its equations. The prediction does not include the noise of hand motion and the \
-         error terms.",
+         for the closed form, from its equations. The prediction does not include the noise of hand motion or the error terms.",
     );
     let mut rows = Vec::new();
     for (path, expected) in &survey.methods {
