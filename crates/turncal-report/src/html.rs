@@ -1,4 +1,4 @@
-//! A document as files: a self-contained page, every figure, and further files.
+//! The files of a document: a self-contained page, every figure, and further files.
 
 use std::path::{Path, PathBuf};
 use std::{fs, io};

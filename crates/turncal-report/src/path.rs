@@ -1,5 +1,5 @@
-//! Report on a path: expected σ and table time, the value of each move, what the path does not show, and whether it
-//! decides a specification.
+//! Report on a path: expected σ and table time, the value of each move, the errors that the path does not show, and
+//! whether a specification can be decided.
 
 use serde::Serialize;
 
@@ -30,7 +30,7 @@ pub struct Report<'a> {
     pub moves: &'a [String],
     /// Expected results.
     pub evaluation: &'a Evaluation,
-    /// Limits of the specification to be decided by the calibration, if any.
+    /// Limits of the specification that the calibration must decide, if any.
     pub checks: Option<&'a [Check]>,
 }
 

@@ -1,9 +1,10 @@
-//! Uncertainty of rates that are rounded to steps wider than their noise.
+//! Uncertainty due to the rounding of rates to steps larger than their noise.
 //!
-//! If nothing moves the value over the edge of a step, the rounding error is the same in every row, and averaging does
-//! not reduce it. With noise of σ, the remaining error is a sum of sine waves of the value, the k-th of amplitude
-//! step/πk · exp(−2π²k²σ²/step²) (Widrow and Kollár, *Quantization Noise*, 2008, on dither). The position of the value
-//! within a step is unknown, so half of their squares add up. With σ of half a step, the remaining error is negligible.
+//! If noise does not carry the value over the edge of a step, the rounding error is the same in every row, and
+//! averaging does not reduce the error. With noise of σ, the remaining error is a sum of sine waves of the value, the
+//! k-th of amplitude step/πk · exp(−2π²k²σ²/step²) (Widrow and Kollár, *Quantization Noise*, 2008, on dither). The
+//! position of the value within a step is unknown, so the mean square of the error is half the sum of the squared
+//! amplitudes. With σ of half a step, the remaining error is negligible.
 
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
@@ -35,7 +36,7 @@ pub fn by_rounding(problem: &Problem, triads: &PerSensor<Triad>) -> ParameterMat
     Sensor::ALL.iter().filter_map(of).sum()
 }
 
-/// Findings on triads for which rounding matters; `covariance` is that of the estimate, rounding included.
+/// Findings on triads for which rounding matters; `covariance` is the covariance of the estimate, including rounding.
 pub fn rounded(
     problem: &Problem,
     by_rounding: &ParameterMatrix,

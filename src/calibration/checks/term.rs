@@ -14,7 +14,7 @@ use crate::statistics::FALSE_ALARM;
 /// A term that a path does not show is reported if it increases the σ of a group by more than this factor.
 const NAMED: f64 = 1.25;
 
-/// Whether a candidate, absent with this probability, counts as present among this many candidates.
+/// Whether a candidate that is absent with this probability counts as present, if there are this many candidates.
 pub fn is_shown(absent: f64, candidates: usize) -> bool {
     absent < FALSE_ALARM / candidates.max(1) as f64
 }
@@ -28,7 +28,7 @@ pub struct TermEvidence {
     pub present: f64,
     /// Whether the data show the term although it was not requested (false-alarm rate 1 in 1000 recordings).
     pub shown: bool,
-    /// Largest remaining part of its usual size: from 0 (known) to 1 (not shown by the recording).
+    /// Largest remaining part of the usual size of the term, from 0 (known) to 1 (not shown by the recording).
     pub remaining: f64,
     /// RMS σ of each of [`Group::all`] with the term, divided by RMS σ if the term were known to be absent; `None` if
     /// the group has no σ.

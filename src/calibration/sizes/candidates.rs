@@ -1,4 +1,4 @@
-//! Constants that may be absent, averaged over absence and their sizes.
+//! Averages of constants that may be absent over their absence and their sizes.
 
 use nalgebra::{DMatrix, DVector};
 

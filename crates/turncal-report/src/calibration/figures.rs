@@ -16,7 +16,7 @@ const WRITTEN: f64 = 0.2;
 const FAINT: f64 = 0.02;
 
 impl Report<'_> {
-    /// All figures with data.
+    /// All figures for which there are data.
     pub fn figures(&self) -> Vec<Plot> {
         let mut plots = Vec::new();
         if let Some(outcome) = self.against_time() {
@@ -29,7 +29,7 @@ impl Report<'_> {
         plots
     }
 
-    /// The filter result if it has a single time axis; several recordings do not have one.
+    /// The filter result, if it has a single time axis; the result of several recordings does not.
     pub fn against_time(&self) -> Option<&Outcome> {
         self.outcome.filter(|outcome| outcome.alone.len() < 2)
     }

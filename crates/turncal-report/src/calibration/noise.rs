@@ -7,7 +7,7 @@ use turncal::imu::{AXES, Noise, Sensor};
 use turncal::noise::curves_at_rest;
 
 impl Report<'_> {
-    /// The Allan deviation over the dwells, a panel for each triad; `None` if they are too short.
+    /// The Allan deviation over the dwells, with a panel for each triad; `None` if the dwells are too short.
     pub fn noise(&self) -> Option<Plot> {
         let (run, outcome) = (self.run, self.outcome?);
         let dwells = run.dwells(self.aiding).into_iter();

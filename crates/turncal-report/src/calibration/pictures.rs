@@ -1,4 +1,4 @@
-//! Properties of single figures of a calibration.
+//! Tests of single figures of a calibration.
 
 use std::collections::BTreeMap;
 use std::fs;

@@ -1,4 +1,4 @@
-//! Residuals before and after calibration, as a figure.
+//! Figure of the residuals before and after calibration.
 
 use super::tables::{ANGLE, FORCE};
 use crate::prelude::*;

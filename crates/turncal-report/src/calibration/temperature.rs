@@ -9,7 +9,7 @@ use turncal::imu::{InstallationForm, RATE, Sensor};
 /// Number of points of a curve.
 const POINTS: usize = 81;
 
-/// Change of parameters with temperature, if they depend on it.
+/// Change of the parameters with temperature, if they depend on temperature.
 pub fn figure(outcome: &Outcome) -> Option<Plot> {
     let thermal = outcome.thermal.as_ref()?;
     let reference = outcome.estimate.vector();
@@ -26,7 +26,7 @@ pub fn figure(outcome: &Outcome) -> Option<Plot> {
     Some(curves(&outcome.estimate, thermal, marks, alone))
 }
 
-/// Adds tables and figures, if anything changes or differs.
+/// Adds tables and figures, if parameters change with temperature or differ between recordings.
 pub fn add(document: &mut Document, outcome: &Outcome) {
     if let Some(thermal) = &outcome.thermal {
         let form = outcome.estimate.form();
@@ -104,8 +104,8 @@ pub fn hysteresis(form: InstallationForm, thermal: &Thermal) -> Table {
     .section(rows)
 }
 
-/// Every parameter against temperature, with marks of this meaning: temperature and change of the parameter from the
-/// reference.
+/// Figure of every parameter against temperature. Each mark is at a temperature and shows the change of the parameter
+/// from the reference; `meaning` describes the marks.
 pub fn curves(
     estimate: &Estimate,
     thermal: &Thermal,

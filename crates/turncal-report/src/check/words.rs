@@ -42,7 +42,7 @@ pub fn signed(angle: f64) -> String {
     format!("{plus}{}", degrees(angle))
 }
 
-/// The log in a sentence or two.
+/// A description of the log in one or two sentences.
 pub fn log(run: &Run, survey: &Survey) -> String {
     let mut text = format!(
         "Stationary for {} s in total, at most {} s at a time; {}.",
@@ -118,7 +118,7 @@ pub fn of_survey(survey: &Survey) -> Vec<String> {
     findings
 }
 
-/// Disagreement between a label and the recording.
+/// Describes the disagreement between a label and the recording.
 pub fn of_label(check: &LabelCheck) -> Option<String> {
     let said = check.disagreement.as_ref()?;
     let at = value(check.segment.start, 1.0);

@@ -5,7 +5,7 @@ use crate::prelude::*;
 use turncal::study::Experiment;
 use turncal::study::experiment::{Estimator, Navigated, Worth};
 
-/// A panel for each situation, a column of errors for each method.
+/// Figure with a panel for each situation and, in each panel, a column of errors for each method.
 pub fn distribution(experiment: &Experiment) -> Plot {
     let all = experiment.navigations.iter().flat_map(|n| &n.methods);
     let all: Vec<f64> = all.flat_map(|w| w.errors.iter().copied()).collect();

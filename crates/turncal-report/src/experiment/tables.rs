@@ -115,7 +115,7 @@ pub fn method_kind(estimator: Estimator) -> &'static str {
     }
 }
 
-/// Name of an estimator with its time to the minute, such as `EKF 10 min`; the facts give the exact value.
+/// Name of an estimator with its table time to the minute, such as `EKF 10 min`; the facts give the exact time.
 pub fn estimator_name(experiment: &Experiment, estimator: Estimator) -> String {
     let minutes = table_time(experiment, estimator).unwrap_or(f64::NAN) / 60.0;
     format!("{} {minutes:.0} min", method_kind(estimator))

@@ -1,10 +1,10 @@
-//! Figures of a comparison: every calibration with σ and limits.
+//! Figures of a comparison, which show every calibration with its σ and the limits.
 
 use super::shown::{Together, in_unit, shown, together};
 use crate::prelude::*;
 use turncal::lot::{Lot, Quantity, Row, Sample};
 
-/// Every calibration, with a panel for each group.
+/// Figure of all calibrations, with a panel for each group.
 pub fn values(lot: &Lot) -> Plot {
     let panels = together(lot).into_iter().map(|of| panel(lot, &of));
     let what = match (&lot.specification, &lot.truth) {

@@ -122,8 +122,8 @@ fn verdict(row: &Row) -> String {
     }
 }
 
-/// Every quantity: the calibrations side by side if they are few, with truth or difference; mean and scatter of three
-/// or more.
+/// Table of every quantity. A few calibrations are shown side by side, with the truth or the difference; three or more
+/// have a mean and a scatter.
 pub fn quantities(lot: &Lot) -> Table {
     let mut columns = Columns::<Quantity>(Vec::new());
     columns.push("", title);
@@ -284,7 +284,8 @@ fn notes(lot: &Lot, mut table: Table) -> Table {
     }
 }
 
-/// Every limit of a single unit, exceeded ones first; for several units, only limits that are exceeded or undecided.
+/// For a single unit, all limits, with the exceeded limits first; for several units, only limits that are exceeded or
+/// undecided.
 pub fn limits(lot: &Lot) -> Table {
     let row = |row: &Row, check: &Check| {
         let quantity = check.quantity();

@@ -1,4 +1,4 @@
-//! Figures 2 to 9 of the paper: the curve of every sample, their mean and standard deviation.
+//! Figures 2 to 9 of the paper: the curve of every sample, with the mean and standard deviation of all curves.
 
 use super::verdict::title;
 use crate::prelude::*;

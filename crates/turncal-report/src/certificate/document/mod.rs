@@ -1,4 +1,4 @@
-//! A calibration certificate: a document, and the content of every page margin.
+//! A calibration certificate: the document and the content of the page margins.
 
 mod results;
 
