@@ -55,7 +55,7 @@ impl Motion {
     /// of the trajectory.
     ///
     /// # Errors
-    /// [`ModelError`] if it cannot be read.
+    /// [`ModelError`] if the trajectory cannot be read.
     pub fn along(
         name: &str,
         latitude: Option<f64>,
@@ -72,7 +72,7 @@ impl Motion {
     }
 }
 
-/// Motion and duration of navigation, from perfect alignment, with the height held to the true height.
+/// Motion and duration of navigation, starting from perfect alignment, with the height fixed to the true height.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mission {
     /// Motion of the body.
@@ -99,23 +99,23 @@ pub struct Pair {
 pub struct Exposure {
     /// Time since the start, s.
     pub time: f64,
-    /// Errors, in the order of [`NavigationError::to_vector`], per parameter error, true − estimated.
+    /// Errors for a unit parameter error (true − estimated), in the order of [`NavigationError::to_vector`].
     pub by_parameter: SMatrix<f64, STATES, PARAMETERS>,
 }
 
-/// Errors in computing the navigation error of a calibration.
+/// Reasons why the navigation error of a calibration cannot be computed.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum NavigationStudyError {
     /// East-North-Up is singular at the poles.
     #[error(transparent)]
     NearPole(#[from] NearPole),
-    /// A calibration that cannot be inverted.
+    /// The calibration cannot be inverted.
     #[error("the sensitivity matrix K·C of the {} is singular: this calibration cannot be used for navigation", .sensor.name())]
     Singular {
         /// The triad.
         sensor: Sensor,
     },
-    /// Roll and heading are not distinguishable.
+    /// Roll and heading cannot be distinguished.
     #[error(
         "at a pitch of ±90°, roll and heading cannot be distinguished: give a pitch within ±89°"
     )]
@@ -123,8 +123,8 @@ pub enum NavigationStudyError {
 }
 
 impl Pair {
-    /// A pair from records, converted to the general form and a common body frame; also returns this frame. The truth
-    /// may be a calibration with its own σ.
+    /// Makes a pair from two records, converted to the general form and a common body frame; also returns this frame.
+    /// The truth may be a calibration with its own σ.
     ///
     /// # Errors
     /// If the records cannot be compared.
@@ -143,7 +143,7 @@ impl Pair {
         Ok((pair, calibration.body_frame))
     }
 
-    /// A copy with the errors of one triad only; the other is calibrated perfectly.
+    /// A copy with the errors of one triad only; the other triad is perfectly calibrated.
     pub fn with_errors_of(mut self, only: Sensor) -> Self {
         for sensor in Sensor::ALL.into_iter().filter(|&sensor| sensor != only) {
             *self.calibration.get_mut(sensor) = *self.truth.get(sensor);

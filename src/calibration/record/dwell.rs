@@ -138,7 +138,7 @@ impl Rest {
         }
     }
 
-    /// End of the step, s.
+    /// Time at the end of the step, s.
     pub fn end(&self) -> f64 {
         self.steps.last().map_or(0.0, |step| step.time)
     }

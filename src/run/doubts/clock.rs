@@ -1,4 +1,4 @@
-//! Moves according to gyros and table: angle and time.
+//! Comparison of moves according to the gyros and according to the table, by angle and time.
 
 use std::ops::Range;
 
@@ -21,7 +21,7 @@ pub struct Move {
     /// Total angle according to the gyros and to the table, counting both senses of rotation, rad.
     gyros: f64,
     table: f64,
-    /// Mean time according to the table, and delay of the gyros, s.
+    /// Mean time of the move according to the table, and delay of the gyros relative to the table, s.
     pub time: f64,
     pub late: f64,
     /// Tolerance for the difference of the two angles of one move, rad.
@@ -59,8 +59,8 @@ fn way(steps: impl Iterator<Item = (f64, f64, f64)>, noise: f64, zero: f64) -> [
     [all, moment / all.max(f64::MIN_POSITIVE), fastest]
 }
 
-/// Reports moves for which gyros and table differ in angle or time; if there are none, a gyro scale factor that all moves
-/// together contradict.
+/// Reports moves for which gyros and table differ in angle or time; if there are no such moves, reports a gyro scale
+/// factor that all moves together contradict.
 ///
 /// This reveals missing rows in one log, clock drift and logs from different runs, for any time stamps.
 pub fn clock(run: &Run) -> Option<String> {
@@ -175,9 +175,9 @@ fn bias_at_rest(run: &Run, stands: &[Dwell]) -> (Vector3<f64>, f64) {
     (bias, SIGMAS * sigma.min(prior.bias_sigma.norm()))
 }
 
-/// Moves that both logs resolve, each from the middle of one standstill of the table to the middle of the next, and the
-/// spans before the first and after the last that both logs cover. Two moves treated as one would have a time error if
-/// the scale factors of their axes differ.
+/// Returns the moves that both logs resolve, each from the middle of one standstill of the table to the middle of the
+/// next. Also returns the spans before the first move and after the last move that both logs cover. Two moves that are
+/// treated as one would have a time error if the scale factors of their axes differed.
 pub fn moves(run: &Run, table: &TableLog) -> Vec<Move> {
     let imu = &run.recording.imu;
     let stands = standstills(run, table);

@@ -1,4 +1,4 @@
-//! Checks of a run on input. They report unusual but possible facts.
+//! Checks of a run when it is read, which report unusual but possible facts.
 
 pub mod clock;
 mod columns;
@@ -24,8 +24,7 @@ impl Run {
         checks.iter().filter_map(|check| check(self)).collect()
     }
 
-    /// A sentence on the true order of the table's quaternions, or on their inverse, if gravity contradicts the stated
-    /// order.
+    /// A sentence on the true order or direction of the table quaternions, if gravity contradicts the stated one.
     pub fn table_quaternions(&self) -> Option<String> {
         quaternions::order(self)
     }

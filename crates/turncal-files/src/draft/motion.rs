@@ -50,7 +50,7 @@ pub struct Motion {
     pub angle: Option<f64>,
     /// Samples before which the gravity direction jumps, as in concatenated sections.
     pub cuts: Vec<usize>,
-    /// Variance of sums of samples at rest, relative to independent samples; smallest axis.
+    /// Variance of sums of samples at rest, relative to independent samples; the smallest value of all axes.
     pub sum_variance: Option<f64>,
 }
 
@@ -204,7 +204,7 @@ fn turn_about(axis: &Vector3<f64>, gyro: &[Vector3<f64>]) -> bool {
     change.abs() > student_limit(degrees, 0.5 * FALSE_ALARM) * sigma
 }
 
-/// Variance of sums of samples at rest, relative to independent samples; smallest axis.
+/// Variance of sums of samples at rest, relative to independent samples; the smallest value of all axes.
 fn sum_variance(samples: &PerSensor<Vec<Vector3<f64>>>, settled: &[Range<usize>]) -> Option<f64> {
     let ratio = |triad: &[Vector3<f64>], axis: usize| {
         let (mut of_sums, mut of_one) = (0.0, 0.0);

@@ -8,15 +8,15 @@ use super::statement::Mounting;
 /// A statement in `run.toml` that the recording contradicts.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Contradiction {
-    /// Axes that are swapped, reversed or left-handed.
+    /// Axes are swapped, reversed or left-handed.
     Axes(Mounting),
-    /// A triad with a sensitivity different from the stated one.
+    /// A triad has a sensitivity different from the stated one.
     Sensitivity(Sensitivity),
-    /// Table quaternions in a different order or inverted, in words.
+    /// Table quaternions are in a different order or inverted; contains a description in words.
     Quaternions(String),
-    /// Motion that no hypothesis explains.
+    /// No hypothesis explains the motion.
     Unexplained,
-    /// Gyro and accelerometer columns swapped.
+    /// The gyro and accelerometer columns are swapped.
     Exchanged,
 }
 
