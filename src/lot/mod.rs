@@ -213,7 +213,7 @@ fn usable<'a>(
 ) -> Result<&'a Calibrated, String> {
     let calibrated = unit.calibrated.as_ref().map_err(Clone::clone)?;
     if calibrated.calibration.converged == Some(false) {
-        return Err("not converged; do not use the values or σ".to_owned());
+        return Err("the calibration did not converge; do not use the values or σ".to_owned());
     }
     match (calibrated.calibration.unit.as_ref(), output) {
         (Some(own), Some(common)) if own != common => Err(format!(

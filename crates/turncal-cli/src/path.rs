@@ -41,8 +41,9 @@ impl PathCommand {
 /// Predicts the σ of a path, the value of each move, and the errors that the path cannot reveal
 ///
 /// The path is a TOML file, an embedded name, or a list of moves by hand, separated by commas: x_up … z_down, and turns
-/// such as "turn x 90". With a run.toml, turncal predicts the σ of its own recording. The prediction is the Cramér–Rao
-/// bound for the stated noise. With a specification, the exit status is 3 if the σ are too large to decide a limit.
+/// such as "turn x 90". With a run.toml, turncal predicts the σ for the recording that it describes. The prediction is
+/// the Cramér–Rao bound for the stated noise. With a specification, the exit status is 3 if the σ are too large to
+/// decide a limit.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal path evaluate three-axis

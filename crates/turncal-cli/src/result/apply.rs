@@ -23,9 +23,10 @@ const SUSPECT_SIGMAS: f64 = 10.0;
 /// Converts the raw samples of a run to angular rate and specific force
 ///
 /// Writes one row per sample: start and end in s, angular rate in rad/s and specific force in m/s², both averaged over
-/// the sample, along right, front and up in the body frame of the calibration. Error terms of the calibration are also
-/// corrected, and so is temperature dependence if the run has a temperature; the correction of the time offset neglects
-/// Earth rate. The name of the last column is the verdict of the calibration, such as verdict_good; the column contains
+/// the sample, along right, front and up in the body frame of the calibration. Also corrects the error terms of the
+/// calibration and, if the run has a temperature, the temperature dependence. The correction of the time offset
+/// neglects Earth rate. The name of the last column is the verdict of the calibration, such as verdict_good; the column
+/// contains
 /// 1. The output can itself be the log of a run.toml: output = "rate", time_stamp = "end".
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
@@ -43,8 +44,8 @@ pub struct Apply {
     /// File to write, `.csv` or `.csv.gz` [default: standard output]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Interpolate missing rows and mark them with 1 in a column `filled`, except in gaps too long for calibrate to
-    /// bridge
+    /// Interpolate missing rows and mark them with 1 in a column `filled`, except in gaps that are too long for
+    /// calibrate to bridge
     #[arg(long)]
     fill: bool,
     /// Replace the output file if it exists, and apply a calibration even if its verdict is FAILED

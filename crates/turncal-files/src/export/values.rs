@@ -115,8 +115,8 @@ impl<'a> Values<'a> {
     pub fn missing(keys: &[String], program: &str) -> Option<String> {
         let keys = (!keys.is_empty()).then(|| keys.join(", "))?;
         Some(format!(
-            "{keys}: {program} does not start without them; export with --run RUN.toml, or measure them with \
-             `turncal allan`"
+            "{keys}: {program} does not start without these keys; export with --run RUN.toml, or measure the noise \
+             with `turncal allan`"
         ))
     }
 }

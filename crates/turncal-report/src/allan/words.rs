@@ -120,23 +120,23 @@ pub fn advice(analysis: &NoiseAnalysis) -> Vec<String> {
             let longer = |factor: f64| duration(factor * analysis.duration());
             let how = match process {
                 Process::Quantisation => {
-                    "a higher sample rate would show it, a longer recording would not"
+                    "a higher sample rate would show this process, but a longer recording would not"
                         .to_owned()
                 }
                 Process::BiasInstability if found(Process::RateRandomWalk) => {
-                    "random walk and rate random walk hide it, so a longer recording would not show it"
+                    "random walk and rate random walk hide this process, so a longer recording would not show it"
                         .to_owned()
                 }
                 Process::BiasInstability | Process::RateRandomWalk if found(Process::RateRamp) => {
-                    "the ramp hides it, so record after warm-up at constant temperature"
+                    "the ramp hides this process, so record after warm-up at constant temperature"
                         .to_owned()
                 }
                 Process::RateRandomWalk => format!(
-                    "a recording twice as long ({}) would show half of that",
+                    "a recording twice as long ({}) would show half of this value",
                     longer(2.0)
                 ),
                 _ => format!(
-                    "a recording four times as long ({}) would show half of that",
+                    "a recording four times as long ({}) would show half of this value",
                     longer(4.0)
                 ),
             };

@@ -94,7 +94,7 @@ fn warming(run: &Run) -> String {
         if span < SOAKED {
             "soaked within 1 K"
         } else {
-            "not soaked, so parameters may change during the recording (see calibrate --temperature)"
+            "the instrument is not soaked, so parameters may change during the recording (see calibrate --temperature)"
         }
     )
 }

@@ -74,7 +74,7 @@ pub fn spread(quantity: Quantity, of: &Spread) -> String {
 
 /// Quantities shown together.
 pub struct Together {
-    /// Heading, with the unit.
+    /// Heading of the quantities, with their unit.
     pub heading: String,
     /// The name of each quantity below the heading.
     pub names: Vec<String>,

@@ -184,8 +184,8 @@ fn figure(navigated: &[MethodOutlook], last: &str) -> Plot {
     } else {
         (
             "Predicted position error in navigation",
-            "±1σ of the error predicted from the covariance of the calibration, with perfect alignment, stationary \
-             and level, with fixed height."
+            "Predicted ±1σ of the error, from the covariance of the calibration, for a stationary and level instrument \
+             with perfect alignment and fixed height."
                 .to_owned(),
         )
     };

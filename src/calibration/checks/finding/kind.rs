@@ -197,7 +197,7 @@ kinds! {
         "This recording cannot show an error term that instruments of this class may have, and K, E or D depend on the \
          term. The σ include its usual size. Add the moves listed in the finding, or state that the instrument does \
          not have the term: sigma = 0 in [imu.terms]. `--with none` leaves out all terms."
-        "U includes the usual size of error terms that the record does not show."
+        "U includes the usual size of error terms that the record cannot show."
 }
 
 impl Kind {

@@ -74,8 +74,8 @@ pub fn not_observed(by: &str, parameters: Vec<String>) -> Option<Finding> {
     let remedies = remedies.iter().filter(|(group, _)| has(group));
     let remedies: Vec<&str> = remedies.map(|(_, remedy)| *remedy).collect();
     let text = format!(
-        "Not determined by {by} (σ is still more than half of the prior): {}. The stated values are kept; do not use \
-         them as calibrated. Add {}.",
+        "Not determined by {by} (σ is still more than half of the prior): {}. turncal kept the stated values; do not \
+         use them as calibrated values. Add {}.",
         listed(&parameters),
         remedies.join(", and ")
     );
