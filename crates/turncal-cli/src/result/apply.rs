@@ -25,9 +25,8 @@ const SUSPECT_SIGMAS: f64 = 10.0;
 /// Writes one row per sample: start and end in s, angular rate in rad/s and specific force in m/s², both averaged over
 /// the sample, along right, front and up in the body frame of the calibration. Also corrects the error terms of the
 /// calibration and, if the run has a temperature, the temperature dependence. The correction of the time offset
-/// neglects Earth rate. The name of the last column is the verdict of the calibration, such as verdict_good; the column
-/// contains
-/// 1. The output can itself be the log of a run.toml: output = "rate", time_stamp = "end".
+/// neglects Earth rate. The last column is named after the verdict of the calibration, such as verdict_good, and
+/// contains the number one. The output can itself be the log of a run.toml: output = "rate", time_stamp = "end".
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal apply result/calibration.json run.toml -o calibrated.csv.gz

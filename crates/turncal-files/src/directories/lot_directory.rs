@@ -175,7 +175,7 @@ fn check_same(target: &Path, found: &Part, expected: &Part) -> Result<(), FileEr
     });
     difference.map_or(Ok(()), |difference| {
         let found = format_args!("a lot started with other options ({difference})");
-        let expected = "the options of the job started here";
+        let expected = "a lot started with the options of this command";
         let advice = "Use the same options, choose another directory, or add --force to restart.";
         Err(FileError::of(target, found, expected, advice))
     })

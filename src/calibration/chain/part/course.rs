@@ -23,7 +23,7 @@ pub struct StepModel<const M: usize> {
 /// a state.
 const KEPT: usize = 32;
 
-/// The sequence of a part, which is reused as far as the next part repeats it.
+/// The sequence of a part. The next part reuses this sequence as far as its own sequence is the same.
 pub struct Course<const M: usize, const G: usize> {
     pub models: Vec<StepModel<M>>,
     /// All events, with the gains of observations.
