@@ -99,7 +99,7 @@ impl TableGeometry {
         self.axes.rows_range(kind.range()).amax() > 0.0
     }
 
-    /// 1σ of the base about East, North and Up, then of each error of the axes.
+    /// 1σ of the base errors about East, North and Up, followed by the 1σ of each error of the axes.
     pub fn vector(&self) -> SVector<f64, TABLE_GEOMETRY> {
         SVector::from_iterator(self.base.iter().chain(&self.axes).copied())
     }

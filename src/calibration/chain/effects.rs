@@ -104,8 +104,8 @@ impl Sizes {
 /// Variance of the noise at rest in each dwell, relative to all dwells.
 ///
 /// A dwell with more motion than the others then does not increase the noise of the others: with an inverse-gamma prior
-/// of the variance, the noise of a dwell is a draw from Student's t (Lange, Little, Taylor 1989, J. Am. Stat. Assoc.
-/// 84(408)).
+/// for the variance, the noise of a dwell follows Student's t distribution (Lange, Little, Taylor 1989, J. Am. Stat.
+/// Assoc. 84(408)).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dispersion(Vec<f64>);
 

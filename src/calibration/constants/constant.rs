@@ -22,7 +22,7 @@ pub enum Constant {
     Base(usize),
     /// An error of the table's axes, by its index.
     Axis(usize),
-    /// Deviation of Earth rate from that at the stated latitude, by its axis: East, North, Up.
+    /// Deviation of Earth rate from its value at the stated latitude, by axis: East, North, Up.
     EarthRate(usize),
 }
 

@@ -252,8 +252,8 @@ impl Left {
     }
 }
 
-/// The most likely noise at rest in the median dwell, each size with its prior; starts from the noise at an earlier
-/// linearisation point, if any.
+/// The most likely noise at rest in the median dwell, with a prior for each size. The search starts from the noise at
+/// an earlier linearisation point, if there is one.
 pub fn likeliest(
     problem: &Problem,
     script: &Script,

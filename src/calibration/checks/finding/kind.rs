@@ -131,7 +131,7 @@ kinds! {
         "A bias changed during the calibration; the result is the mean before and after the change."
     EarthRateWrong = "W19" "earth-rate-wrong" Care:
         "In all attitudes, the gyros sense an Earth rate that does not match the stated latitude. turncal estimated \
-         the difference. Check latitude_deg (first its sign) and the north and level of the table."
+         the difference. Check latitude_deg, first its sign, then the north and level of the table."
         "The measured Earth rate differs from that at the stated latitude; the difference was estimated with the \
          results."
     FarFromPrior = "W20" "far-from-prior" Care:
