@@ -69,8 +69,8 @@ pub fn clock(run: &Run) -> Option<String> {
     if let Some(first) = others.next() {
         return Some(format!(
             "In {} of {} moves the gyros and the table turn by different angles. The first is at {:.1} s: the gyros \
-             measure {:.1}°, the table {:.1}°. Look for lost, repeated, clipped or wrapped rows in these moves, or for \
-             logs from different runs or clocks. If there are none, check gyro_unit, scale and the unit of the table \
+             measure {:.1}°, the table {:.1}°. Look for lost, repeated, clipped or wrapped rows in these moves, and \
+             for logs from different runs or clocks; otherwise check gyro_unit, scale and the unit of the table \
              angles.",
             1 + others.count(),
             moves.len(),
@@ -151,7 +151,7 @@ fn scale(run: &Run, moves: &[Move]) -> Option<String> {
     (table > 0.0 && off.abs() > SIGMAS * sigma + sum(|m| m.zero) / table).then(|| {
         format!(
             "Over all {} moves the gyros turn {:.0} ppm {} than the table, but scale_sigma_ppm of [imu.prior.gyro] \
-             states {:.0} ppm. Check scale and scale_sigma_ppm in this table, and gyro_unit.",
+             states {:.0} ppm. Check gyro_unit, and scale and scale_sigma_ppm in [imu.prior.gyro].",
             moves.len(),
             off.abs() / PPM,
             if off > 0.0 { "more" } else { "less" },
