@@ -73,7 +73,7 @@ impl Finding {
         }
     }
 
-    /// Severity. Kinds from another version that are unknown here have the level [`Level::Care`].
+    /// Severity. Kinds from another version that are unknown here have the level `care`.
     pub fn level(&self) -> Level {
         let of_kind = || Kind::named(&self.kind).map_or(Level::Care, Kind::level);
         self.level.unwrap_or_else(of_kind)
