@@ -1,4 +1,4 @@
-//! Averages of constants that may be absent over their absence and their sizes.
+//! Averaging over the absence and the sizes of constants that may be absent.
 
 use nalgebra::{DMatrix, DVector};
 
