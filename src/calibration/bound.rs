@@ -14,7 +14,7 @@ use crate::imu::{PerSensor, TermVector, Triad};
 pub struct Bound {
     /// The truth, with the bound as its covariance.
     pub estimate: Estimate,
-    /// Covariance of the parameters of error terms and table.
+    /// Covariance of the parameters of the error terms and of the table errors.
     pub auxiliary: Auxiliary,
     /// σ against time.
     pub history: Vec<Epoch>,
@@ -29,8 +29,8 @@ pub struct Bound {
 pub struct TermLeftOff {
     /// The term.
     pub term: ErrorTerm,
-    /// Remaining fraction of the prior σ, for the combination of its parameters with the largest fraction, if the term
-    /// were estimated with its usual σ: from 0 (known) to 1 (not observed).
+    /// Remaining fraction of the prior σ, from 0 (known) to 1 (not observed), if the term were estimated with its usual
+    /// σ. The value is for the combination of its parameters with the largest fraction.
     pub remaining: f64,
     /// 1σ of the change of each parameter if the term has its usual size.
     pub change: ParameterVector,
@@ -38,8 +38,9 @@ pub struct TermLeftOff {
 
 /// The covariance of a chain linearised at the truth, with the stated noise and error terms of the problem and the true
 /// `terms`, in the misalignment form of the truth: the inverse of the Bayesian information matrix for Gaussian noise
-/// (Van Trees, *Detection, Estimation, and Modulation Theory*, part I, §2.4.3). The initial attitude is that of the
-/// first reading or the coarse start: arc seconds of tilt and arc minutes of heading have no effect on the covariance.
+/// (Van Trees, *Detection, Estimation, and Modulation Theory*, part I, §2.4.3). The initial attitude is taken from the
+/// first reading or the coarse start, because arc seconds of tilt and arc minutes of heading have no effect on the
+/// covariance.
 ///
 /// # Errors
 /// [`CalibrationError`] as for [`super::estimate`].
@@ -89,7 +90,7 @@ pub fn bound_without_moves(
     Ok((bound, filtered.without_moves(posterior)))
 }
 
-/// The constant error terms that a problem does not estimate, linearised at a truth as for [`bound`].
+/// The constant error terms that a problem does not estimate, linearised at a truth as in [`bound`].
 ///
 /// # Errors
 /// [`CalibrationError`] as for [`super::estimate`].

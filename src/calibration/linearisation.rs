@@ -35,7 +35,7 @@ pub struct Linearisation {
 }
 
 impl Linearisation {
-    /// A point without temperature dependence and without differences between recordings.
+    /// A linearisation point without temperature dependence and without differences between recordings.
     pub fn new(
         triads: PerSensor<Triad>,
         terms: TermVector,
@@ -135,10 +135,11 @@ pub fn singular(triads: &PerSensor<Triad>) -> CalibrationError {
 pub struct AttitudePrior {
     /// `C_b_n`: a table reading or, without a table, the coarse alignment.
     pub mean: Matrix3<f64>,
-    /// 1σ about East, North and Up, rad; the last is that of the heading.
+    /// 1σ about East, North and Up, rad; the last component is the σ of the heading.
     pub sigma: Vector3<f64>,
-    /// 1σ of Earth rate along East, North and Up of this attitude, rad/s. If the heading is unknown, the heading is
-    /// fixed and Earth rate has any horizontal direction; if the site is unknown, any direction. Otherwise, zero.
+    /// 1σ of Earth rate along the East, North and Up axes of this attitude, rad/s. If the heading is unknown, the
+    /// heading is fixed and Earth rate has any horizontal direction; if the site is unknown, any direction. Otherwise,
+    /// zero.
     pub earth_rate_sigma: Vector3<f64>,
 }
 

@@ -15,7 +15,7 @@ pub struct Pass {
     pub observations: usize,
 }
 
-/// Callback after each pass. It may stop the work; the command line uses it to display the progress.
+/// Callback after each pass. The callback may stop the work. The command line uses it to display the progress.
 pub type Progress<'a> = &'a (dyn Fn(&Pass) -> ControlFlow<()> + Sync);
 
 /// A callback that does nothing.

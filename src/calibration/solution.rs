@@ -1,4 +1,4 @@
-//! Solution of a problem by either method, with its assessment.
+//! The solution of a problem by either method, and its assessment.
 
 use crate::calibration::result::Provenance;
 use crate::calibration::start::closed_form::six_position_by;
@@ -9,7 +9,7 @@ use crate::calibration::{
 use crate::imu::{PerSensor, Sensor};
 use crate::units::DEGREE;
 
-/// Result of a method for a problem.
+/// Result of one method for a problem.
 #[derive(Debug, Clone)]
 pub enum Solution {
     /// The filter.
@@ -55,7 +55,7 @@ impl Problem<'_> {
         })
     }
 
-    /// Origin of a calibration of the problem, without the files.
+    /// Origin of a calibration of the problem, without the list of files.
     pub fn provenance(&self) -> Provenance {
         let run = self.run();
         let imu = &run.recording.imu;
@@ -142,7 +142,7 @@ impl Solution {
         }
     }
 
-    /// The calibration, in the quantity of the file.
+    /// The calibration, in the file's quantity.
     pub fn calibration(&self, problem: &Problem, assessment: &Assessment) -> Calibration {
         match self {
             Self::Filter(outcome) => {

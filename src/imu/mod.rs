@@ -1,4 +1,4 @@
-//! The instrument: output of a triad of gyros or accelerometers as a function of its input.
+//! The model of the instrument: the output of a triad of gyros or accelerometers as a function of its input.
 //!
 //! `N = K C u + D` (Zhao, Jiang, Li 2016, Eq. 6; in the second line of the printed Eq. 6, `N_g` means the
 //! accelerometer). `u` is the angular rate in rad/s or the specific force in m/s² along the body axes, `K` diagonal,

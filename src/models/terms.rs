@@ -15,7 +15,8 @@ pub struct TermFile {
     pub sigma: NonNegative,
 }
 
-/// 1σ of the parameters of enabled error terms, in SI, zero for the others; and the terms stated to be absent.
+/// Returns the 1σ of the parameters of enabled error terms, in SI units (zero for the others), and the terms stated to
+/// be absent.
 pub fn stated_terms(
     document: Document,
     table: &str,

@@ -1,12 +1,11 @@
 //! Strapdown navigation and its error model, in two forms.
 //!
-//! [`Navigator`] serves calibration: its frame is fixed to the Earth at the site (East-North-Up
-//! there). A turntable does not travel, so gravity and Earth rate are those of the site, not of
-//! the computed position, and there is no transport rate: the equations are exact for the truth
-//! (`V = 0` at rest) and linear in velocity and position.
+//! [`Navigator`] serves calibration. Its frame is fixed to the Earth and is East-North-Up at the site. A turntable does
+//! not travel, so gravity and Earth rate are those of the site, not of the computed position, and there is no transport
+//! rate: the equations are exact for the truth (`V = 0` at rest) and linear in velocity and position.
 //!
-//! [`Strapdown`] is nonlinear navigation on the ellipsoid; [`NonlinearError`] is its deviation from the truth, which
-//! measures a calibration; [`ErrorModel`] is its linear error model, [`NavigationError`] the reported error.
+//! [`Strapdown`] is nonlinear navigation on the ellipsoid; [`NonlinearError`] is its deviation from the truth, by which
+//! a calibration is judged; [`ErrorModel`] is its linear error model; [`NavigationError`] is the reported error.
 //! [`Trajectory`] is the true motion of a moving body.
 //!
 //! Source: Savage, *Strapdown Analytics*, 2nd ed., ch. 4 and 7; Zhao, Jiang, Li 2016, Eq. 13.

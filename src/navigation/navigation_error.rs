@@ -49,7 +49,7 @@ impl NavigationError {
         self.position.xy().norm()
     }
 
-    /// Pitch, roll, heading; velocity; position: the order of [`Self::by_state`].
+    /// Pitch, roll and heading, then velocity, then position, which is the order of [`Self::by_state`].
     pub fn to_vector(&self) -> ErrorVector {
         joined([self.attitude, self.velocity, self.position])
     }

@@ -1,4 +1,4 @@
-//! The analysed stretch of a run, and its noise.
+//! The stretch of a run that is analysed, and its noise.
 
 use std::ops::Range;
 
@@ -24,7 +24,7 @@ pub struct Stretch {
     pub stands: bool,
 }
 
-/// Errors in finding a stretch to analyse.
+/// Reasons why no stretch can be analysed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum StretchError {
     /// No segment has the label.

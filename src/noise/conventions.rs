@@ -1,8 +1,8 @@
 //! The conventions for noise figures, and their users.
 //!
-//! Each row of the table is a unit, with its value in SI and the relation of the figure to the strength of the
-//! process. Densities are two-sided (IEEE Std 952): white noise of density N has `σ = N √rate` in samples at that
-//! rate. Sources: Kalibr, *IMU Noise Model* (wiki); PSINS, `imuerrset`; KF-GINS, its configuration file.
+//! Each row of the table contains a unit, its value in SI units, and the relation of the figure to the strength of the
+//! process. Densities are two-sided (IEEE Std 952): white noise of density N has `σ = N √rate` in samples at that rate.
+//! Sources: Kalibr, *IMU Noise Model* (wiki); PSINS, `imuerrset`; KF-GINS, its configuration file.
 
 use Scale::{Increments, Linear, Power, Samples};
 use serde::Serialize;
@@ -161,14 +161,14 @@ static QUANTITIES: [Quantity; 6] = [
     ] },
 ];
 
-/// A noise figure in every convention.
+/// A noise figure, converted to every convention.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Conversion {
     /// Name of the quantity.
     pub quantity: &'static str,
-    /// Name of its triad.
+    /// Name of the triad of the quantity.
     pub sensor: &'static str,
-    /// The figure as interpreted.
+    /// The figure, as it was interpreted.
     pub given: Figure,
     /// Sample rate in Hz.
     pub rate_hz: Option<f64>,
@@ -176,7 +176,7 @@ pub struct Conversion {
     pub figures: Vec<Figure>,
 }
 
-/// A noise figure in one convention.
+/// A noise figure, converted to one convention.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Figure {
     /// Value in the unit of the convention.
@@ -186,7 +186,7 @@ pub struct Figure {
     pub convention: &'static Convention,
 }
 
-/// A figure that could not be converted.
+/// Errors for a figure that cannot be converted.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ConversionError {
     /// Unknown unit.
@@ -196,15 +196,15 @@ pub enum ConversionError {
         known()
     )]
     Unknown {
-        /// The unit as given.
+        /// The unit, as given by the user.
         unit: String,
     },
-    /// A figure per sample without the sample rate.
+    /// The figure is per sample, but no sample rate is given.
     #[error(
         "`{unit}` is noise per sample, which needs the sample rate: add --rate with the rate in Hz"
     )]
     NoRate {
-        /// The unit as given.
+        /// The unit, as given by the user.
         unit: String,
     },
 }

@@ -8,14 +8,14 @@ use thiserror::Error;
 use super::{Bridge, Fault, FaultKind, LogFacts, Series, Temperature};
 use crate::imu::{Output, PerSensor, Sensor};
 
-/// The samples of both triads, at one period, in one stretch or several.
+/// The samples of both triads, with one sample period, in one or several stretches.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ImuSamples {
     /// Length of every sample, s.
     pub period: f64,
     /// Relative 1σ of the sample length; zero if a clock determines it.
     pub period_sigma: f64,
-    /// Stretches of consecutive samples, in order; at least one. Between two stretches at least one sample is
+    /// Stretches of consecutive samples, in order; there is at least one. Between two stretches at least one sample is
     /// lost.
     pub stretches: Vec<Stretch>,
     /// Whether samples are consecutive in time; otherwise they are concatenated sections, and only a labelled section
@@ -25,9 +25,9 @@ pub struct ImuSamples {
     pub gyro: Series,
     /// Integrals of the normalised accelerometer output over each sample, m/s.
     pub accel: Series,
-    /// One pulse, rad and m/s, if samples are whole pulses; zero otherwise.
+    /// Size of one pulse, rad and m/s, if samples are whole pulses; zero otherwise.
     pub pulse: PerSensor<f64>,
-    /// Faults of the file's samples, in order of kind, axis and time.
+    /// Faults of the samples in the file, in order of kind, axis and time.
     pub faults: Vec<Fault>,
     /// Interpolated samples, grouped by axes, in order of time; bridges of one axis do not
     /// overlap.
@@ -42,7 +42,7 @@ pub struct ImuSamples {
 pub const FEWEST_SAMPLES: usize = 100;
 
 impl ImuSamples {
-    /// Whether each sample is the mean output in a position, as in a table of six means.
+    /// Whether each sample is the mean output in one position, as in a table of six means.
     pub fn is_of_means(&self) -> bool {
         !self.continuous && self.len() < FEWEST_SAMPLES
     }
@@ -63,10 +63,10 @@ pub struct Stretch {
     pub start: f64,
 }
 
-/// Invalid arrays of samples.
+/// Errors in arrays of samples.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum SampleError {
-    /// Triads with different numbers of samples.
+    /// The triads have different numbers of samples.
     #[error("{gyro} gyro samples but {accel} accelerometer samples; give one of each per period")]
     Lengths {
         /// Samples of the gyros.
@@ -77,10 +77,10 @@ pub enum SampleError {
     /// No samples.
     #[error("no samples; give the output integrated over each period")]
     Empty,
-    /// A number that is not finite.
+    /// A number is not finite.
     #[error("sample {sample} is not finite; remove it, or split the recording there")]
     NotFinite {
-        /// The first such sample.
+        /// The first sample with such a number.
         sample: usize,
     },
     /// An invalid period.
@@ -118,7 +118,7 @@ impl ImuSamples {
     /// Consecutive samples without a gap; the first begins at `start`, s.
     ///
     /// # Errors
-    /// [`SampleError`], as for [`super::Recording::from_samples`].
+    /// [`SampleError`], as in [`super::Recording::from_samples`].
     pub fn new(
         start: f64,
         period: f64,
@@ -149,7 +149,7 @@ impl ImuSamples {
         Ok(Self::made(start, period, gyro, accel))
     }
 
-    /// Samples of rates with another period that has this relative 1σ.
+    /// A copy of samples of rates, with another sample period that has this relative 1σ.
     pub fn with_period(mut self, period: f64, sigma: f64) -> Self {
         let longer = period / self.period;
         for triad in [&mut self.gyro, &mut self.accel] {
@@ -244,7 +244,7 @@ impl ImuSamples {
         self.continuous && !self.is_lost(samples)
     }
 
-    /// Whether some of these samples are lost.
+    /// Whether any of these samples are lost.
     pub fn is_lost(&self, samples: &Range<usize>) -> bool {
         let begun = |stretch: &Stretch| stretch.samples.start <= samples.start;
         let begun = self.stretches.partition_point(begun);
@@ -261,7 +261,7 @@ impl ImuSamples {
             .filter(|missing| !missing.is_empty())
     }
 
-    /// The samples without a row in the log, interpolated or not, in order.
+    /// The samples that have no row in the log, whether interpolated or not, in order.
     pub fn lost(&self) -> Vec<Range<usize>> {
         let faults = self.faults.iter();
         let bridged = faults.filter(|fault| fault.kind == FaultKind::Missing);

@@ -10,11 +10,11 @@ use crate::units::DEGREE;
 /// A labelled section of the recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Segment {
-    /// Stamp of its first row, s.
+    /// Time stamp of the first row of the section, s.
     pub start: f64,
-    /// The first stamp after its last row, s.
+    /// The first time stamp after the last row of the section, s.
     pub end: f64,
-    /// The samples, at least one.
+    /// The samples of the section, at least one.
     pub samples: Range<usize>,
     /// `x_up` … `z_down`, `rot_x+360` and the like, or any other text.
     pub label: String,

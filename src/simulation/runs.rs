@@ -6,7 +6,7 @@ use crate::calibration::Difference;
 use crate::imu::TermVector;
 use crate::turntable::{Imperfection, TableError};
 
-/// Many runs of a scenario. With a perfect table, all of them share one drive, which is computed once.
+/// Many runs of a scenario. With a perfect table, all runs share one drive, which is computed once.
 #[derive(Debug, Clone)]
 pub struct Runs {
     scenario: Scenario,

@@ -1,7 +1,7 @@
 //! Accuracy of the filter and consistency of its σ over many simulated runs, compared with the truth, the Cramér–Rao
 //! bound, and the closed form on the static positions of the paper.
 //!
-//! Everything is compared in the general form and in the body frame of the table.
+//! All values are compared in the general form and in the body frame of the table.
 
 mod baseline;
 mod configuration;
@@ -44,7 +44,7 @@ pub struct Accuracy {
     pub anees: Option<Anees>,
     /// Figures of each error term that was estimated, RMS over its parameters, in rad or SI.
     pub error_terms: Vec<(ErrorTerm, Figures)>,
-    /// Evidence for each error term in the first run.
+    /// Evidence for each error term, from the first run.
     pub effects: Vec<TermEvidence>,
     /// NIS of zero velocity over all runs.
     pub velocity: Nis,
@@ -57,7 +57,7 @@ pub struct Accuracy {
 pub struct Anees {
     /// The average.
     pub mean: f64,
-    /// n, the number of directions of one run that have a σ.
+    /// n, the number of directions with a σ in one run.
     pub directions: usize,
     /// 95 % interval of the average if the σ are correct (χ²).
     pub interval_95: (f64, f64),
@@ -109,7 +109,7 @@ impl Study for AccuracyStudy {
 }
 
 impl Accuracy {
-    /// Results of the filter in the runs in which it did not fail.
+    /// Results of the filter in the runs in which the filter did not fail.
     pub fn filtered(&self) -> impl Iterator<Item = &Filtered> {
         filtered(&self.trials)
     }

@@ -13,7 +13,7 @@ pub struct CheckedCalibration {
     pub solution: Solution,
     /// Checks.
     pub assessment: Assessment,
-    /// The calibration to write.
+    /// The calibration that is written to a file.
     pub calibration: Calibration,
 }
 
@@ -41,7 +41,7 @@ impl CheckedCalibration {
         })
     }
 
-    /// Consequences of the calibration of this problem. The truth may be unknown.
+    /// Computes the consequences of the calibration of this problem; the truth may be unknown.
     pub fn consequences(
         &self,
         problem: &Problem,

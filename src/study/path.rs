@@ -1,4 +1,4 @@
-//! Predicted accuracy of a path, before any data exist: σ from the covariance of a recording along it.
+//! Predicted accuracy of a path before any data exist, from the covariance of a recording along this path.
 
 use super::navigation::{Mission, NavigationStudyError, Outlook};
 use crate::calibration::{
@@ -16,7 +16,7 @@ use crate::turntable::TableError;
 /// A path to evaluate.
 #[derive(Debug, Clone)]
 pub struct PathStudy {
-    /// The path with instrument, table and site.
+    /// The path, with the instrument, table and site.
     pub scenario: Scenario,
     /// Whether the sensor is turned by hand, without a table.
     pub by_hand: bool,
@@ -29,13 +29,13 @@ pub struct PathStudy {
 pub struct Named<'a> {
     /// The path: a TOML file, an embedded name, or a list of moves by hand.
     pub path: &'a str,
-    /// The scenario; `None` for the usual one.
+    /// The scenario; `None` for the default scenario.
     pub scenario: Option<&'a str>,
-    /// Instrument in place of the scenario's.
+    /// Instrument that replaces the instrument of the scenario.
     pub imu: Option<&'a str>,
-    /// Table in place of the scenario's.
+    /// Table that replaces the table of the scenario.
     pub table: Option<&'a str>,
-    /// Observations of the filter; `None` for the table, or velocity by hand.
+    /// Observations used by the filter. `None` means the table or, for moves by hand, velocity.
     pub aiding: Option<Aiding>,
     /// Error terms to estimate.
     pub terms: Vec<ErrorTerm>,
@@ -48,9 +48,9 @@ pub struct Evaluation {
     pub duration: f64,
     /// Total duration of the dwells, s.
     pub standing: f64,
-    /// Observations of the filter.
+    /// Observations used by the filter.
     pub aiding: Aiding,
-    /// Expected covariance, its history, and the combinations of parameters that it determines.
+    /// Expected covariance, its history, and the combinations of parameters that the path determines.
     pub bound: Bound,
     /// Error terms that are not estimated.
     pub left_off: Vec<TermLeftOff>,
@@ -86,7 +86,7 @@ pub enum PathError {
     /// A model cannot be read.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// Words that are not moves.
+    /// The words are not moves.
     #[error("{0}")]
     Words(String),
     /// The table cannot follow the path.
@@ -101,7 +101,7 @@ pub enum PathError {
 }
 
 impl PathStudy {
-    /// A path with the models given by name.
+    /// Reads a path and the models that are given by name.
     ///
     /// # Errors [`PathError`] if a model cannot be read, or the words are not moves.
     pub fn load(named: &Named) -> Result<Self, PathError> {
@@ -173,7 +173,7 @@ impl PathStudy {
 }
 
 impl Evaluation {
-    /// Expected results of calibrating a run's own recording, linearised at the triads where the filter would start.
+    /// Expected results of the calibration of a run, linearised at the triads with which the filter would start.
     ///
     /// # Errors
     /// [`PathError`] if no calibration is possible.
@@ -185,7 +185,7 @@ impl Evaluation {
         Ok(evaluation)
     }
 
-    /// Every limit of a specification, for a unit at its nominal values: a limit that passes can be decided.
+    /// Check of every limit of a specification for a unit at its nominal values; a limit that passes can be decided.
     pub fn decided(&self, specification: &Specification) -> Vec<Check> {
         decided(specification, &self.bound.estimate)
     }

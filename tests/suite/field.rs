@@ -944,7 +944,7 @@ fn a_table_log_by_another_clock_is_put_on_that_of_the_imu() {
             .for_each(|time| *time += late + drift * *time);
         let note = run.align_table().unwrap();
         assert!(
-            note.contains("put the table log on the clock of the IMU"),
+            note.contains("converted the times of the table log to the clock of the IMU"),
             "{note}"
         );
         let time = &run.recording.table.as_ref().unwrap().time;

@@ -1,4 +1,4 @@
-//! Commands: each parses its arguments, calls the library and reports the result.
+//! The commands. Each of them parses its arguments, calls the library and reports the result.
 
 /// Prints a line on standard error. A closed pipe, as with `head`, is not a failure.
 macro_rules! tell {

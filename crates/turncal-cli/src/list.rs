@@ -8,8 +8,8 @@ use turncal_report::{Document, Facts};
 
 /// Shows the embedded scenarios, instruments, installations, tables, paths and trajectories
 ///
-/// Commands and your own scenarios accept these names in place of a TOML file. If a file of that name exists,
-/// the file is used instead.
+/// Commands and your own scenarios accept these names in place of TOML files. If a file of that name exists, the file
+/// is used instead.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal list

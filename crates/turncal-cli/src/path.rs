@@ -38,11 +38,12 @@ impl PathCommand {
     }
 }
 
-/// Predicts σ, the value of each move, and errors that a path cannot reveal
+/// Predicts the σ of a path, the value of each move, and the errors that the path cannot reveal
 ///
 /// The path is a TOML file, an embedded name, or a list of moves by hand, separated by commas: x_up … z_down, and turns
-/// such as "turn x 90". With a run.toml, turncal predicts the σ of its own recording. The prediction is the Cramér–Rao
-/// bound for the stated noise. With a specification, the exit status is 3 if the σ are too large to decide a limit.
+/// such as "turn x 90". With a run.toml, turncal predicts the σ for the recording that it describes. The prediction is
+/// the Cramér–Rao bound for the stated noise. With a specification, the exit status is 3 if the σ are too large to
+/// decide a limit.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal path evaluate three-axis
@@ -64,8 +65,8 @@ pub struct Evaluate {
     /// Observations of the filter [default: table; by hand: velocity]
     #[arg(long, value_parser = one_of(&AIDINGS))]
     aiding: Option<Aiding>,
-    /// Error terms of the calibration. auto: averages over the absence and the usual sizes of every term; none: only K,
-    /// E and D; or names of terms to estimate in any case [default: auto]
+    /// Error terms of the calibration. auto: average over the absence and the usual sizes of every term; none: only K,
+    /// E and D; or the names of terms to estimate in any case [default: auto]
     #[arg(long, value_name = "TERM", value_parser = with_value(), value_delimiter = ',')]
     with: Vec<With>,
     /// Specification: tests whether the predicted σ are small enough to decide pass or fail

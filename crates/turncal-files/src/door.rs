@@ -1,4 +1,4 @@
-//! Single entry point for inputs: a `run.toml`, or a log whose description is found in it or stated by options.
+//! Single entry point for inputs: a `run.toml`, or a log that is described by its own content and by options.
 
 use std::ffi::OsStr;
 use std::fs::{self, File};
@@ -17,7 +17,7 @@ const STANDARD_INPUT: &str = "-";
 /// File name for rows of standard input.
 const PIPED: &str = "stdin.csv";
 
-/// A run and, for a log without run.toml, the draft used to read it.
+/// A run and, for a log without run.toml, the draft with which the log was read.
 #[derive(Debug)]
 pub struct Opened {
     /// The run.
@@ -38,7 +38,7 @@ impl Opened {
     /// any error.
     ///
     /// # Errors
-    /// [`FileError`] if it cannot be read, or if required fields of a log are neither detected nor stated.
+    /// [`FileError`] if the file cannot be read, or if required fields of a log are neither detected nor stated.
     pub fn new(
         path: &Path,
         stream: Option<&str>,
@@ -74,10 +74,10 @@ impl Opened {
         Self::of_file(file, files, (stream, stated), show)
     }
 
-    /// Reads several logs of one sensor, each of one position; `None` if it was turned in one.
+    /// Reads several logs of one sensor, each recorded in one position; `None` if the sensor was turned in any of them.
     ///
     /// # Errors
-    /// As for [`Self::new`], and if the logs have different columns.
+    /// The errors of [`Self::new`], and an error if the logs have different columns.
     pub fn of_positions(
         paths: &[PathBuf],
         (stream, stated): (Option<&str>, &Stated),
@@ -145,7 +145,7 @@ impl Opened {
     /// Reads a log that has grown, with the fields found earlier.
     ///
     /// # Errors
-    /// [`FileError`] if it cannot be read.
+    /// [`FileError`] if the log cannot be read.
     pub fn read_again(&mut self) -> Result<(), FileError> {
         if let Some(Log { path, draft, .. }) = &self.log {
             let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -162,7 +162,7 @@ impl Opened {
     /// Writes the `run.toml` used to read a log into a result directory.
     ///
     /// # Errors
-    /// [`FileError`] if it cannot be written.
+    /// [`FileError`] if the file cannot be written.
     pub fn write_run(&self, directory: &Path) -> Result<(), FileError> {
         let Some(log) = &self.log else {
             return Ok(());
@@ -178,7 +178,8 @@ impl Opened {
     }
 }
 
-/// Whether a file is, by its extension, a `run.toml` or `campaign.toml` (which refer to other files) and not a log.
+/// Whether the extension of a file shows that it is a `run.toml` or `campaign.toml`, which refer to other files, and
+/// not a log.
 pub fn is_toml(path: &Path) -> bool {
     path.extension() == Some(OsStr::new("toml"))
 }

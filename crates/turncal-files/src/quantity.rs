@@ -60,8 +60,8 @@ const MULTIPLES: [(&str, f64, &[&str]); 5] = [
     ("g", 1e-6, &["ug"]),
 ];
 
-/// Units of the rows of a triad: quantity of the file per second for one rad/s or m/s². A count has no inherent nominal
-/// scale.
+/// Units of the rows of a triad: quantity of the file per second for one rad/s or m/s². A count does not imply a
+/// nominal scale.
 pub fn units(sensor: Sensor, output: Output) -> impl Iterator<Item = (&'static str, Option<f64>)> {
     let usable = move |row: &&Row| row.1 == Count || row.1 == Rows(sensor, output);
     let scaled = |&(word, of, per_si, _): &Row| (word, (of != Count).then_some(per_si));

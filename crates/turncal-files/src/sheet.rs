@@ -1,4 +1,4 @@
-//! The columns of a file of rows, unchanged.
+//! The unchanged columns of a file of rows.
 
 use turncal_input::FileError;
 use turncal_logs::rows::LogRows;
@@ -8,11 +8,11 @@ use turncal_logs::{DataFile, Source};
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sheet {
     pub names: Vec<String>,
-    /// Units from the row below the names; empty without such a row.
+    /// Units from the row below the names; empty if there is no such row.
     pub units: Vec<String>,
     /// Row rate stated in comments, Hz.
     pub rate: Option<f64>,
-    /// NaN for missing numbers.
+    /// The numbers; NaN where a number is missing.
     pub columns: Vec<Vec<f64>>,
     /// Whether the file has further rows.
     pub goes_on: bool,

@@ -36,7 +36,7 @@ const MEANINGS: [(&str, &str); 19] = [
         "one [[recording]] per run, with run = \"its run.toml\"",
     ),
     ("run", "the path of a run.toml"),
-    ("sigma", "the 1σ of each of its parameters"),
+    ("sigma", "the 1σ of each parameter of the term"),
     ("time", "a column name"),
     (
         "time_stamp",
@@ -52,10 +52,10 @@ const KINDS: [(&str, &str); 4] = [
     ("a map", "a table"),
 ];
 
-/// The text that spans refer to.
+/// The text to which spans refer.
 #[derive(Clone, Copy)]
 pub struct Document<'a> {
-    /// The file name in errors.
+    /// The file name used in errors.
     pub file: &'a Path,
     /// Text.
     pub text: &'a str,
@@ -129,7 +129,7 @@ impl<'a> Document<'a> {
         self.no_field(span, table, name, meaning)
     }
 
-    /// Refuses names of fields in a table, `table.table`, that are not among the known ones.
+    /// Refuses field names in a table, `table.table`, that are not among the known names.
     pub fn only(
         self,
         path: &str,

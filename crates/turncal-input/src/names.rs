@@ -1,4 +1,4 @@
-//! Column names, each for one quantity.
+//! Column names, each of which may be used for one quantity only.
 
 use super::error::{choice, excerpt, nearest};
 
@@ -7,7 +7,7 @@ use super::error::{choice, excerpt, nearest};
 pub struct FileColumn {
     /// Name in the file; empty if the triad was not recorded.
     pub name: String,
-    /// Whether its values are read with the sign reversed.
+    /// Whether the values of the column are read with the sign reversed.
     pub reversed: bool,
 }
 
@@ -32,7 +32,8 @@ pub fn find(all: &[String], taken: &[usize], name: &str) -> Result<usize, [Strin
         [_, ..] => Err([
             format!("two columns named `{name}`"),
             "a unique name".to_owned(),
-            "Refer to it by its number (the first is `1`), or rename one of them.".to_owned(),
+            "Refer to the column by its number (the first is `1`), or rename one of the columns."
+                .to_owned(),
         ]),
         [] => {
             let advice = "Correct `columns` in run.toml or this header.";

@@ -29,9 +29,9 @@ const GZIP: [u8; 2] = [0x1f, 0x8b];
 /// A file of rows, positioned at one row.
 ///
 /// Fields are separated by commas, semicolons, tabs or blanks, according to most rows. Lines that begin with `#`, `%`
-/// or `//` are comments; those above the names, or above rows of numbers without names, are a preamble. Columns without
-/// names are called `1`, `2`, …. Numbers may have a decimal comma if commas are not separators; a time may be a clock
-/// time.
+/// or `//` are comments; comments above the names, or above rows of numbers without names, form a preamble. Columns
+/// without names are called `1`, `2`, …. Numbers may have a decimal comma if commas are not separators; a time may be a
+/// clock time.
 pub struct CsvFile {
     file: PathBuf,
     lines: Lines,
@@ -82,7 +82,7 @@ enum Cut {
 }
 
 impl CsvFile {
-    /// Opens a file and reads its header; for tagged rows, selects those with this tag.
+    /// Opens a file and reads its header; if the rows are tagged, selects the rows with this tag.
     pub fn open(file: &DataFile, tag: Option<&str>) -> Result<Self, FileError> {
         let stopped = |stop: Stop| stopped(file, &stop);
         let mut lines = Lines::open(source(file)?).map_err(stopped)?;
@@ -200,7 +200,7 @@ fn not_rows(file: &DataFile, lines: &Lines, is_labelled: bool) -> Option<FileErr
         ),
         0 => (
             "NUL bytes at its beginning",
-            "The log was not written, or its memory was erased: copy the log again.",
+            "The log was not written, or its memory was erased. Copy the log again.",
         ),
         _ => return None,
     };

@@ -1,4 +1,4 @@
-//! A file of rows: on disk, as bytes in memory (for example in a browser), or as columns in memory.
+//! A file of rows on disk, as bytes in memory (for example in a browser), or as columns in memory.
 
 use std::fs::{self, File};
 use std::io::{self, Cursor, Read, Seek};

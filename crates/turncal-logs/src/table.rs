@@ -15,7 +15,7 @@ pub struct Table {
 }
 
 impl Table {
-    /// Columns with their names; NaN marks a missing number. Errors call the table by `name`.
+    /// Columns with their names; NaN marks a missing number. Errors refer to the table by `name`.
     ///
     /// # Errors
     /// [`FileError`] if the columns differ in length.
@@ -53,7 +53,7 @@ impl Table {
         &self.names
     }
 
-    /// The rows from the first on.
+    /// The rows, starting with the first.
     pub fn rows(&self) -> TableRows {
         TableRows {
             table: self.clone(),
@@ -65,7 +65,7 @@ impl Table {
     }
 }
 
-/// A table at one of its rows.
+/// A table, positioned at one of its rows.
 pub struct TableRows {
     table: Table,
     /// Units of the columns; empty if not stated.

@@ -1,4 +1,4 @@
-//! A document as files: a self-contained page, every figure, and further files.
+//! The files of a document: a self-contained page, every figure, and further files.
 
 use std::path::{Path, PathBuf};
 use std::{fs, io};
@@ -16,7 +16,7 @@ const STYLE: &str = include_str!("style.css");
 /// Letters of the longest number with σ and unit.
 const LONGEST: usize = 20;
 
-/// A file of a report that could not be written.
+/// Error for a file of a report that could not be written.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot write {path}: {source}. The directory must exist and be writable", path = path.display())]
 pub struct ReportError {

@@ -1,5 +1,5 @@
-//! Report on a path: expected σ and table time, the value of each move, what the path does not show, and whether it
-//! decides a specification.
+//! Report on a path: expected σ and table time, the value of each move, the errors that the path does not show, and
+//! whether a specification can be decided.
 
 use serde::Serialize;
 
@@ -30,7 +30,7 @@ pub struct Report<'a> {
     pub moves: &'a [String],
     /// Expected results.
     pub evaluation: &'a Evaluation,
-    /// Limits of the specification to be decided by the calibration, if any.
+    /// Limits of the specification that the calibration must decide, if any.
     pub checks: Option<&'a [Check]>,
 }
 
@@ -92,7 +92,7 @@ impl Report<'_> {
             (None, _, unobserved) => (
                 Word::UseWithCare,
                 format!(
-                    "σ of {} of parameters is still more than half of the prior",
+                    "the σ of {} of parameters is still more than half of the prior",
                     several(unobserved, "combination")
                 ),
             ),
@@ -159,7 +159,7 @@ impl Report<'_> {
         };
         let columns = cells!["", "move", "s"].into_iter();
         let columns = columns.chain(Group::all().map(Group::short));
-        let mut table = Table::new("σ without each move, divided by σ with all moves", columns)
+        let mut table = Table::new("σ without each move, divided by the σ with all moves", columns)
             .section(self.evaluation.without.iter().enumerate().map(row))
             .note("A path without the move also lacks the dwell after it. Evaluate the shorter path before you use \
                 it.");

@@ -1,4 +1,4 @@
-//! Status of a calibration in progress, as a screen that is redrawn or as lines.
+//! Status of a calibration in progress, shown as a screen that is redrawn or as single lines.
 
 use std::collections::BTreeSet;
 
@@ -44,7 +44,7 @@ pub fn words(next: Move) -> String {
     }
 }
 
-/// The screen: at most 80 columns, the state first, the next move last.
+/// The screen, with at most 80 columns; the state comes first and the next move last.
 pub fn screen(run: &Run, status: &Status, specification: Option<&Specification>) -> Vec<String> {
     let mut lines = vec![so_far(status), String::new()];
     match &status.expected {
@@ -73,7 +73,7 @@ pub fn screen(run: &Run, status: &Status, specification: Option<&Specification>)
     lines
 }
 
-/// The state after a dwell in one line.
+/// One line with the state after a dwell.
 pub fn line(status: &Status, dwell: usize) -> Option<String> {
     let rest = status.survey.rests.get(dwell)?;
     let up = check::way_up(rest.up.axis, rest.up.down);
@@ -169,7 +169,8 @@ fn calibrated(last: &InterimCalibration) -> String {
     format!("calibration of the first {time} s: {word}{codes}")
 }
 
-/// Findings about the rows, then those that restrict the use of the last calibration: the first sentence of each.
+/// The first sentence of each finding: first the findings about the rows, then those that restrict the use of the last
+/// calibration.
 pub fn notes(run: &Run, status: &Status) -> Vec<String> {
     let mut findings = run.recording.doubts.clone();
     findings.extend(check::of_survey(&status.survey));
@@ -222,7 +223,7 @@ fn coverage(status: &Status) -> Vec<String> {
     lines
 }
 
-/// The state as data: σ of each group, unobserved parameters and the next move.
+/// The state as data: the σ of each group, the parameters that are not observed, and the next move.
 pub fn data(status: &Status) -> Value {
     let attained = status.expected.as_ref().ok();
     let last = attained.and_then(|attained| attained.history.last());

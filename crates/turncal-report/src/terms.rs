@@ -9,7 +9,7 @@ use turncal::calibration::{
 };
 use turncal::turntable::AxisError;
 
-/// An error term in words.
+/// The name of an error term in words.
 pub fn title(block: ErrorTerm) -> &'static str {
     match block {
         ErrorTerm::GaussMarkovBias => "Gauss–Markov biases",
@@ -31,7 +31,7 @@ pub fn unit(block: ErrorTerm) -> (&'static str, f64) {
     }
 }
 
-/// Rows of the parameter table; with errors if requested by `errors` and stated in the truth.
+/// Rows of the parameter table, with errors if `errors` requests them and the truth states them.
 pub fn rows(
     auxiliary: &Auxiliary,
     truth: &BTreeMap<String, TermRecord>,
@@ -54,8 +54,8 @@ pub fn rows(
     auxiliary.estimated().filter_map(row).collect()
 }
 
-/// A row of the table of parameters: a value with its σ, which is zero if it is fixed; the ratio of prior to posterior
-/// σ; and, in a table with errors, its error if known.
+/// A row of the parameter table: a value with its σ (zero if the value is fixed), the ratio of prior to posterior σ
+/// and, in a table with errors, the error if it is known.
 pub fn parameter_row(
     name: String,
     unit: &str,

@@ -1,4 +1,4 @@
-//! Contribution of the model's curvature to a covariance.
+//! Contribution of the second-order terms of the model to a covariance.
 //!
 //! A linear filter assumes that `K C` is linear in the parameters. If a path leaves some parameters at
 //! their prior σ, squares and products of their errors affect the parameters that it determines: two angles of 200″

@@ -1,4 +1,4 @@
-//! The Kalman filter through the chain, with the constants as columns.
+//! The Kalman filter of the chain, with the constants as sensitivity columns.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -14,7 +14,8 @@ const BLOCK: usize = 100;
 /// A filtered link.
 #[derive(Debug, Clone)]
 pub struct Passed {
-    /// States before the rows: mean given zero constants, effect of the constants, and covariance.
+    /// States before the rows are used: the mean if all constants are zero, the effect of the constants, and the
+    /// covariance.
     pub mean: DVector<f64>,
     pub by_constants: DMatrix<f64>,
     pub covariance: DMatrix<f64>,
@@ -158,7 +159,7 @@ impl Passed {
 }
 
 impl Filtered<'_> {
-    /// Information of all rows and the prior on the constants.
+    /// Information on the constants from all rows and the prior.
     pub fn known(&self, prior: &Prior) -> Known {
         let c = self.chain.constants.len();
         let mut known = Known::new(prior.clone());
@@ -188,7 +189,7 @@ impl Filtered<'_> {
         })
     }
 
-    /// Information of all rows on the constants.
+    /// Information on the constants from all rows.
     pub fn information(&self) -> DMatrix<f64> {
         let c = self.chain.constants.len();
         let mut information = DMatrix::zeros(c, c);

@@ -21,7 +21,7 @@ pub struct Chain {
     pub links: Vec<Link>,
     /// Number of scalars that were observed.
     pub observations: usize,
-    /// 1σ of the slip in one move, divided by that of a position.
+    /// 1σ of the slip in one move, divided by the 1σ of a table position.
     pub slip: f64,
     /// Sum of squares of the observations within parts that does not depend on states or constants.
     pub squares: f64,
@@ -30,7 +30,7 @@ pub struct Chain {
 }
 
 impl Chain {
-    /// A copy without the rows of some dwells, given by number.
+    /// A copy without the rows of the dwells with these numbers.
     pub fn observed_in(mut self, used: impl Fn(usize) -> bool) -> Self {
         let (n, c) = (self.states.count, self.constants.len());
         for link in self.links.iter_mut().filter(|link| !used(link.dwell)) {

@@ -1,7 +1,7 @@
-//! Reduction of a part of a dwell, with only the noise at rest, to whitened rows of the states at its beginning.
+//! Reduction of a part of a dwell, disturbed only by noise at rest, to whitened rows in the states at its beginning.
 //!
 //! At rest the parameters act through three constant rates and three constant specific forces. Given these and the
-//! states at the beginning (together `g`), only noise remains. A filter of the moving states whitens it in each
+//! states at the beginning (together `g`), only noise remains. A filter of the moving states whitens this noise in each
 //! observation. The whitened observations and the states at the end are linear in `g`: together they contain all
 //! information of the part (Friedland 1969, "Treatment of bias in recursive filtering", IEEE Trans. Automatic Control
 //! 14(4)).
@@ -33,14 +33,14 @@ pub struct Part {
     pub log_determinant: f64,
     /// Number of scalars that were observed.
     pub count: usize,
-    /// Moving states at the end: rows of `g`, offset, covariance.
+    /// Moving states at the end of the part: rows in `g`, offset and covariance.
     pub of_given: DMatrix<f64>,
     pub offset: DVector<f64>,
     pub covariance: DMatrix<f64>,
 }
 
 impl Part {
-    /// A copy with all noise variances multiplied by a factor.
+    /// A copy in which all noise variances are multiplied by a factor.
     pub fn dispersed(mut self, factor: f64) -> Self {
         let root = factor.sqrt();
         self.measured /= root;
@@ -54,13 +54,13 @@ impl Part {
 
 /// An observation, whitened by its covariance given `g`.
 pub struct Whitened<'a> {
-    /// Number among the observations of the part.
+    /// Number of the observation within the part.
     pub number: usize,
-    /// Three scalars with σ = 1, given `g = 0`.
+    /// The three scalars for `g = 0`, each with σ = 1.
     pub scalars: Vector3<f64>,
     /// Lower triangular root of the covariance of the three components.
     pub root: &'a Matrix3<f64>,
-    /// Rows of `g` of the three scalars, one after the other.
+    /// Coefficients of `g` in the three scalars, one row after the other.
     pub rows: &'a [f64],
 }
 
@@ -69,7 +69,8 @@ pub trait PartFilter {
     /// Size of `g`.
     fn given(&self) -> usize;
 
-    /// The reduction of a part; `None` if a covariance is not positive definite. `seen` receives each observation.
+    /// The reduction of a part; `None` if a covariance is not positive definite. The callback `seen` receives each
+    /// observation.
     fn reduce(
         &mut self,
         part: (&Rest, &Stretch),

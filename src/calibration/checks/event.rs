@@ -1,4 +1,4 @@
-//! Single events that stand out: a wrong position, a move, a velocity, a step of a bias, a slip.
+//! Detection of single unusual events: a wrong position, move or velocity, a bias step, or a slip.
 
 use std::collections::BTreeMap;
 
@@ -30,20 +30,20 @@ pub enum EventKind {
     Slip(Slip),
 }
 
-/// An event too large to be produced by its effect by chance, in spite of the heavy tails.
+/// An event that is too large to result from its effect by chance, even with heavy tails.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Event {
     /// Kind.
     pub kind: EventKind,
-    /// Number, from zero, of the dwell that the event concerns or precedes.
+    /// Number, from zero, of the dwell that contains or follows the event.
     pub dwell: usize,
-    /// End of the first part of that dwell, s.
+    /// End of the first part of this dwell, s.
     pub time: f64,
-    /// Size, in rad, m/s, rad/s or m/s².
+    /// Size of the event, in rad, m/s, rad/s or m/s².
     pub size: f64,
     /// −2 ln of the p-value.
     pub significance: f64,
-    /// The limit of the significance at a false-alarm rate of 0.1 % over all events.
+    /// Limit of the significance, for a false-alarm rate of 0.1 % over all events.
     pub limit: f64,
 }
 
@@ -229,8 +229,8 @@ impl EventKind {
                     Kind::Slipped,
                     format!(
                         "Before dwell {number} (at {time:.1} s) {what} by {angle}. turncal estimated this angle; the \
-                         misalignments refer to the mounting before that. Fasten the instrument and the table, and \
-                         repeat the recording"
+                         misalignments refer to the mounting before this event. Fasten the instrument and the table, \
+                         and repeat the recording"
                     ),
                 )
             }

@@ -13,7 +13,7 @@ use crate::statistics::{FALSE_ALARM, chi_square_limit};
 /// The likelihood ratio of a restricted misalignment form against the general one.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct FormTest {
-    /// Decrease of the cost, −2 ln of likelihood and prior, if the general form is allowed.
+    /// Decrease of the cost (−2 ln of likelihood times prior) if the general form is allowed.
     pub gain: f64,
     /// Number of additional angles of the general form.
     pub angles: usize,

@@ -54,9 +54,9 @@ pub struct Innovation {
     pub whitened: [f64; 3],
     /// σ of the three components, rad or m/s.
     pub sigma: [f64; 3],
-    /// Number of its dwell.
+    /// Number of the dwell that contains the observation.
     pub dwell: usize,
-    /// Whether the innovation shows the errors of the move before its dwell; false if rows are missing in between.
+    /// Whether the innovation shows the errors of the move before its dwell; false if rows are missing between the two.
     pub after_move: bool,
 }
 
@@ -81,7 +81,7 @@ pub struct Consistency {
 }
 
 impl Consistency {
-    /// The kinds of observation that were made.
+    /// The kinds of observation that occurred.
     pub fn kinds(&self) -> impl Iterator<Item = (Observation, Nis)> {
         let each = [self.velocity, self.table, self.attitude];
         let all = Observation::ALL.into_iter().zip(each);
@@ -188,7 +188,8 @@ pub fn inconsistent(innovations: &[Innovation], pulses: &[Observation]) -> Optio
         }
     }
     let text = format!(
-        "Residuals are not of the size that their σ predict. Relative to it they are: {}. Check {}.",
+        "The residuals do not have the size that their σ predict. Relative to the predicted size, they are: {}. Check \
+         {}.",
         each.join("; "),
         causes.join("; ")
     );
@@ -232,9 +233,9 @@ fn nis<'a>(innovations: impl Iterator<Item = &'a Innovation>) -> Nis {
     }
 }
 
-/// The interval outside which the mean of `count` squared standard normal numbers lies with probability
-/// `outside`, half on each side (Bar-Shalom, Li, Kirubarajan, *Estimation with Applications to
-/// Tracking and Navigation*, §5.4.2). NaN if there are none.
+/// The interval outside which the mean of `count` squared standard normal numbers lies with probability `outside`, half
+/// on each side (Bar-Shalom, Li, Kirubarajan, *Estimation with Applications to Tracking and Navigation*, §5.4.2). NaN
+/// if there are no numbers.
 pub fn mean_square_interval(count: usize, outside: f64) -> (f64, f64) {
     let n = count as f64;
     ChiSquared::new(n).map_or((f64::NAN, f64::NAN), |chi2| {

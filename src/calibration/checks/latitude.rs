@@ -65,8 +65,8 @@ pub fn earth_rate(problem: &Problem, outcome: &Outcome) -> Option<Finding> {
 
 fn of_north(north: f64) -> String {
     format!(
-        "The north of the table is off by {}°: the gyros sense Earth rate {} of it. turncal estimated Earth rate, so \
-         K, E and D do not depend on it. Correct the azimuth of the table.",
+        "The north of the table is off by {}°: the gyros sense the north of Earth rate {} of it. turncal estimated \
+         Earth rate, so K, E and D do not depend on it. Correct the azimuth of the table.",
         value(north.abs() / DEGREE, 0.01),
         if north > 0.0 { "east" } else { "west" }
     )

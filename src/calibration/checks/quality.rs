@@ -1,4 +1,4 @@
-//! Quality of a calibration by references that need no truth: gravity and turns.
+//! Quality of a calibration, judged by references that do not require the truth: gravity and turns.
 
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -35,7 +35,7 @@ pub struct Quality {
     /// Residuals in the excluded dwells, from the calibration without them.
     #[serde(skip)]
     pub held_out_dwells: Vec<DwellResidual>,
-    /// Residuals in each dwell before calibration: nominal scales, no misalignment, no bias.
+    /// Residuals in each dwell before calibration, that is, with nominal scales, no misalignments and no biases.
     #[serde(skip)]
     pub nominal_dwells: Vec<DwellResidual>,
 }
@@ -48,7 +48,7 @@ pub struct DwellResidual {
     /// Magnitude of the mean specific force minus gravity, m/s².
     pub gravity: f64,
     /// Angle between the gravity direction measured by the accelerometers and the one carried over from the previous
-    /// dwell by the gyros, rad; none in the first dwell of a stretch.
+    /// dwell by the gyros, rad; `None` in the first dwell of a stretch.
     pub direction: Option<f64>,
 }
 

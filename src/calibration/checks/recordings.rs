@@ -11,9 +11,9 @@ use crate::calibration::{DayToDay, Finding, FindingKind as Kind, Group, Model};
 pub struct RecordingDifference {
     /// The key of `[day_to_day]`.
     pub key: String,
-    /// The stated 1σ, in its unit.
+    /// The stated 1σ, in the unit of the key.
     pub stated: f64,
-    /// 1σ estimated from the recordings, in its unit.
+    /// 1σ estimated from the recordings, in the unit of the key.
     pub found: f64,
     /// −2 ln of the likelihood ratio of the stated to the estimated σ.
     pub ratio: f64,

@@ -9,7 +9,7 @@ use crate::statistics::{FALSE_ALARM, chi_square_limit};
 /// Number of triads with tested residuals.
 const TRIADS: f64 = 2.0;
 
-/// Residuals of least squares.
+/// Statistics of least-squares residuals.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Residuals {
     /// Sum of squared whitened residuals.
@@ -34,12 +34,12 @@ impl Residuals {
         chi_square_limit(self.degrees as f64, FALSE_ALARM / TRIADS)
     }
 
-    /// Whether the residuals are larger than chance explains.
+    /// Whether the residuals are larger than can be explained by chance.
     pub fn are_large(&self) -> bool {
         self.chi_square > self.limit()
     }
 
-    /// The finding on residuals of `gyro`, `accel` or `both triads` that are larger than chance explains.
+    /// The finding on residuals of `gyro`, `accel` or `both triads` that are larger than can be explained by chance.
     pub fn finding(&self, of: &str) -> Option<Finding> {
         let Self {
             chi_square,

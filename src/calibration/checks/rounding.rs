@@ -1,4 +1,4 @@
-//! Uncertainty of rates that are rounded to steps wider than their noise.
+//! Uncertainty due to the rounding of rates to steps larger than their noise.
 
 use std::collections::BTreeMap;
 
@@ -27,7 +27,7 @@ pub fn by_rounding(problem: &Problem, triads: &PerSensor<Triad>) -> ParameterMat
     Sensor::ALL.iter().filter_map(of).sum()
 }
 
-/// Findings on triads for which rounding matters; `covariance` is that of the estimate, rounding included.
+/// Findings on triads for which rounding matters; `covariance` is the covariance of the estimate, including rounding.
 pub fn rounded(
     problem: &Problem,
     by_rounding: &ParameterMatrix,

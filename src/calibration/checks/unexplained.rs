@@ -1,4 +1,5 @@
-//! Tests for results that must not be used: without convergence, or with residuals that no noise figure explains.
+//! Tests for results that must not be used, because the iterations did not converge or no noise figure explains the
+//! residuals.
 
 use serde_json::json;
 
@@ -59,7 +60,7 @@ pub fn absurd(problem: &Problem, outcome: &Outcome) -> Option<Finding> {
     (middle > ABSURD).then(|| Finding::new(Kind::Unexplained, text, figures))
 }
 
-/// The finding, if innovations are larger than wrong figures of a data sheet can explain.
+/// The finding, if the innovations are larger than wrong data-sheet values can explain.
 pub fn unexplained(all: &Nis, innovations: &[Innovation]) -> Option<Finding> {
     let distances = innovations.iter().map(|i| (i.time, i.distance()));
     let worst = distances.max_by(|one, other| one.1.total_cmp(&other.1))?;

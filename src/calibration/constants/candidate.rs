@@ -12,7 +12,7 @@ pub enum Candidate {
     Term(ErrorTerm),
     /// A latitude that differs from the stated one.
     EarthRate,
-    /// A function of temperature in all parameters of a kind.
+    /// A function of temperature for all parameters of one kind.
     Order(Sensor, ParameterKind, usize),
 }
 

@@ -16,9 +16,9 @@ use crate::number::three_digits;
 pub struct NoiseReport {
     /// The requested policy.
     pub policy: NoisePolicy,
-    /// Whether the noise was estimated; otherwise it is as stated.
+    /// Whether the noise was estimated; if not, the stated noise was used.
     pub learnt: bool,
-    /// The test of the stated noise; `None` if nothing was tested.
+    /// The test of the stated noise; `None` if no figure was tested.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub test: Option<NoiseTest>,
     /// Every possible source of the recording.
@@ -29,7 +29,7 @@ pub struct NoiseReport {
 /// The test of the stated noise against the estimated noise.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct NoiseTest {
-    /// The largest squared distance of a stated figure from the estimate, in logarithms and their σ.
+    /// The largest squared distance of a stated figure from the estimate: logarithm of the ratio, in units of its σ.
     #[serde(default)]
     pub ratio: f64,
     /// Limit of the squared distance for correct stated noise (χ², p < 0.001 over all figures).
@@ -48,12 +48,12 @@ pub struct SourceFigures {
     pub name: String,
     /// Unit of the figures.
     pub unit: String,
-    /// The stated value, or the one measured in dwells before the filter; `None` if neither exists.
+    /// The stated value, or the value measured in dwells before the filter; `None` if neither exists.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stated: Option<f64>,
     /// The value used.
     pub used: f64,
-    /// 95 % interval; `None` if it was not estimated.
+    /// 95 % interval of the estimate; `None` if the source was not estimated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub interval: Option<[f64; 2]>,
 }
@@ -109,7 +109,7 @@ impl SourceFigures {
         }
     }
 
-    /// Whether the source is present, stated or estimated.
+    /// Whether the source is present, because it was stated or estimated.
     pub fn counts(&self) -> bool {
         self.used > 0.0 || self.stated.is_some()
     }
@@ -180,7 +180,7 @@ fn noise_learnt(
     let lines: Vec<&String> = lines.iter().map(|(_, line)| line).collect();
     let text = format!(
         "Noise is larger than stated: {} (squared distance {ratio:.0}; limit {limit:.0}). turncal used its own \
-         estimate, and each σ includes it. To use this estimate for the next recording, state {}.",
+         estimate, which is included in every σ. To use this estimate for the next recording, state {}.",
         words.join("; "),
         tables.join("; ")
     );

@@ -33,13 +33,13 @@ pub struct Correction {
 pub struct Calibrated {
     /// Time at which the sample begins, s.
     pub start: f64,
-    /// Time at which it ends, s.
+    /// Time at which the sample ends, s.
     pub end: f64,
     /// Mean angular rate against inertial space, rad/s.
     pub rate: Vector3<f64>,
     /// Mean specific force, m/s².
     pub force: Vector3<f64>,
-    /// Whether its temperature is within the range of the calibration.
+    /// Whether the temperature of the sample is within the range of the calibration.
     pub in_range: bool,
 }
 
@@ -67,7 +67,7 @@ pub enum CorrectionError {
          entry to ignore it"
     )]
     UnknownTerm(String),
-    /// The unit differs from that of the run.
+    /// The unit of the calibration differs from that of the run.
     #[error(
         "the calibration is for {} output in `{calibration}`, but the run uses `{run}`. Give the calibration of this \
          instrument, or correct {}_unit in run.toml", .sensor.name(), .sensor.name()
@@ -80,7 +80,7 @@ pub enum CorrectionError {
         /// Unit of the run.
         run: String,
     },
-    /// The scale differs from that of the run.
+    /// The scale of the calibration differs from that of the run.
     #[error(
         "{} {axis}: the calibration has {calibration:.6e} per {}, but the nominal scale of the run is {run:.6e}. \
          They must have the same sign and agree within a factor of two. Give the calibration of this \
@@ -176,9 +176,9 @@ impl Correction {
     /// Calibrates these samples of a run, in sequence.
     ///
     /// Error terms are evaluated at the calibrated sample. The angular acceleration for the size effect is the
-    /// difference of the rates before and after; it is zero if the record is not continuous. The time offset
-    /// uses the inertial rate instead of the rate relative to the Earth: the error is 0.7 µg for 10 ms times
-    /// Earth rate.
+    /// difference of the rates before and after; it is zero if the record is not continuous. The time offset uses the
+    /// inertial rate instead of the rate relative to the Earth: with Earth rate, the error is 0.7 µg for an offset of
+    /// 10 ms.
     pub fn samples<'a>(
         &'a self,
         run: &'a Run,

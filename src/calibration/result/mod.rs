@@ -1,7 +1,7 @@
 //! A calibration as a file: `calibration.json` and `truth.json`.
 //!
-//! Values are in the file's quantity (see [`crate::imu::Nominal`]): `N = scale ⊙ (installation · u)
-//! + bias`, with `u` in rad/s or m/s² along right-front-up.
+//! Values are in the file's quantity per second (see [`crate::imu::Nominal`]): `N = scale ⊙ (installation · u) + bias`,
+//! with `u` in rad/s or m/s² along right-front-up.
 
 pub(super) mod at_temperature;
 pub(super) mod correction;
@@ -49,7 +49,7 @@ pub struct Calibration {
     /// Form of the misalignment matrix.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub installation_form: Option<InstallationForm>,
-    /// Observations of the filter; `None` for a method without filter.
+    /// Observations that the filter used; `None` for a method without a filter.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub aiding: Option<Aiding>,
     /// The body frame.
@@ -62,10 +62,10 @@ pub struct Calibration {
     /// Quantity of the file, such as `count`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<PerSensor<String>>,
-    /// Quantity of a row of the file: for rates N is the row, otherwise the row divided by the sample period.
+    /// Quantity in a row of the file. For rates, N is the row; otherwise, N is the row divided by the sample period.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub output: Option<Output>,
-    /// Columns of the log along x, y and z of each triad, with a minus if the sign is reversed.
+    /// Columns of the log along x, y and z of each triad, with a minus sign if the sign is reversed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub columns: Option<PerSensor<[String; 3]>>,
     /// 1σ of every value, zero if fixed.
@@ -74,7 +74,7 @@ pub struct Calibration {
     /// Names of the estimated parameters, such as `gyro.installation.xy`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub parameters: Vec<String>,
-    /// Covariance of the estimated parameters, in their units.
+    /// Covariance of the estimated parameters, in the units of the parameters.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub covariance: Vec<Vec<f64>>,
     /// Uncertainty budget of the parameters.
@@ -84,10 +84,10 @@ pub struct Calibration {
     /// such as `table.base.up`, in rad, by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub terms: BTreeMap<String, TermRecord>,
-    /// Temperature dependence; the values are those at the reference. `None` without temperature dependence.
+    /// Temperature dependence; the values apply at the reference temperature. `None` without temperature dependence.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature: Option<ThermalRecord>,
-    /// Results of each of several recordings.
+    /// Results of each recording, if there are several.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub recordings: Vec<RecordingRecord>,
     /// Gravity at the site.
@@ -105,7 +105,7 @@ pub struct Calibration {
     /// Residuals of gravity and turns.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quality: Option<Quality>,
-    /// Effects of error terms, enabled or not.
+    /// Effects of the error terms, whether enabled or not.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub blocks: Vec<BlockRecord>,
     /// Independent directions of the parameters, the least observed first.
@@ -127,7 +127,7 @@ pub struct Calibration {
     /// The warnings in structured form: kind, text, figures.
     #[serde(default)]
     pub findings: Vec<Finding>,
-    /// Names of parameters that were not estimated.
+    /// Names of the parameters that were not estimated.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub fixed: Vec<String>,
     /// The model in words, [`EQUATION`] or [`EQUATION_WITH_TERMS`].
@@ -136,7 +136,7 @@ pub struct Calibration {
     /// The matrix of `u = correction (N − bias)`, ready to use.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub correction: Option<PerSensor<[[f64; 3]; 3]>>,
-    /// Raw outputs with their calibrated values, to check a user's own code.
+    /// Raw outputs with their calibrated values, with which users can test their own code.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub test_vectors: Vec<TestVector>,
     /// Origin of the calibration.
@@ -182,7 +182,7 @@ pub struct InputFile {
 /// The noise that a calibration used.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NoiseRecord {
-    /// Policy, test and sources.
+    /// Noise policy, test of the stated noise, and noise sources.
     #[serde(flatten)]
     pub report: NoiseReport,
     /// The estimated noise as `[imu.noise]`, to be pasted into `run.toml`; `None` if the noise was not estimated.
@@ -213,7 +213,7 @@ pub struct TermRecord {
 pub struct GravityRecord {
     /// Magnitude.
     pub m_s2: f64,
-    /// 1σ, common to the scale factors of all three accelerometers.
+    /// 1σ of gravity, which is common to the scale factors of all three accelerometers.
     pub sigma_m_s2: f64,
 }
 
@@ -247,7 +247,7 @@ pub struct ConsistencyRecord {
     /// NIS of zero velocity.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub velocity: Option<NisRecord>,
-    /// NIS of the table's attitude.
+    /// NIS of the table attitude.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub table: Option<NisRecord>,
     /// NIS of the constant attitude at standstill, without a table.
@@ -255,10 +255,10 @@ pub struct ConsistencyRecord {
     pub attitude: Option<NisRecord>,
 }
 
-/// Mean normalised innovation squared with its 95 % interval; one if the σ are correct.
+/// Mean normalised innovation squared with its 95 % interval; the mean is one if the σ are correct.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct NisRecord {
-    /// Mean per scalar observation.
+    /// Mean over the scalar observations.
     pub nis: f64,
     /// 95 % interval (χ²).
     pub nis_interval: [f64; 2],
@@ -274,10 +274,10 @@ pub struct BlockRecord {
     /// Probability that the term is present.
     #[serde(default)]
     pub present: f64,
-    /// Largest remaining part of its usual size: from 0 (known) to 1 (not shown).
+    /// Largest remaining part of the usual size of the term, from 0 (known) to 1 (not shown).
     #[serde(default)]
     pub remaining: f64,
-    /// σ with the term divided by σ if it were absent, of gyro K, E, D and accel K, E, D; `None` if there is no σ.
+    /// σ with the term divided by σ without the term, for gyro K, E, D and accel K, E, D; `None` if there is no σ.
     pub sigma_factors: [Option<f64>; 6],
 }
 
@@ -352,9 +352,9 @@ impl Calibration {
         }
     }
 
-    /// A parameter by name: `gyro.scale.x` and `gyro.bias.x` in the file's quantity,
-    /// `gyro.installation.xy` the entry of the misalignment matrix in that row and column, the same for
-    /// `accel`; then parameters of error terms such as `accel.time_offset`, in SI.
+    /// A parameter by name: `gyro.scale.x` and `gyro.bias.x` in the file's quantity, `gyro.installation.xy` for the
+    /// entry of the misalignment matrix in that row and column, and likewise for `accel`; also parameters of error
+    /// terms such as `accel.time_offset`, in SI.
     pub fn get(&self, name: &str) -> Option<&f64> {
         let of_triads = entry(name, |sensor| self.triad(sensor));
         of_triads.or_else(|| self.terms.get(name).map(|term| &term.value))

@@ -1,9 +1,9 @@
-//! An instrument that is never turned: its biases against temperature.
+//! Biases against temperature for an instrument that is never turned.
 //!
 //! In one attitude, scale factors, misalignments and the true input are constant, so each output is the bias of its
-//! axis plus an unknown constant. Means over blocks are rows of the same constants as those of a recording with turns,
-//! without navigation: basis, selection of orders, and covariance are the same. Navigation through such a recording
-//! does not converge if the biases wander: over two hours at 0.2 °/s, the innovations are 20 times their σ.
+//! axis plus an unknown constant. Means over blocks give rows in the same constants as a recording with turns, but
+//! without navigation. The basis, the averaging over orders and the covariance are the same. Navigation through such a
+//! recording does not converge if the biases wander: over two hours at 0.2 °/s, the innovations are 20 times their σ.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -35,7 +35,7 @@ const FEWEST_BLOCKS: f64 = 30.0;
 /// Biases of an instrument at rest against temperature.
 #[derive(Debug, Clone)]
 pub struct AtRest {
-    /// The outputs at the reference temperature in place of the biases; nothing else is estimated.
+    /// The outputs at the reference temperature, which stand for the biases; no other parameters are estimated.
     pub outputs: Estimate,
     /// Change of the biases with temperature.
     pub thermal: Thermal,
@@ -52,7 +52,7 @@ pub struct MeanAtRest {
     pub temperature: f64,
     /// Rate, K/s.
     pub rate: f64,
-    /// Output minus that at the reference, normalised, rad/s or m/s².
+    /// Normalised output minus the output at the reference temperature, rad/s or m/s².
     pub change: f64,
     /// Residual from the polynomial.
     pub residual: f64,
@@ -71,8 +71,8 @@ struct Block {
 }
 
 impl Problem<'_> {
-    /// The biases against temperature, if the instrument is never turned: `None` with several dwells or recordings,
-    /// without temperature, or if it changes too little.
+    /// The biases against temperature, if the instrument is never turned. `None` if there are several dwells or
+    /// recordings, if there is no temperature, or if the temperature changes too little.
     pub fn at_rest(&self) -> Option<AtRest> {
         let run = self.run();
         if self.dwells().nth(1).is_some() || self.runs().nth(1).is_some() {

@@ -1,4 +1,4 @@
-//! Repeatability: each recording calibrated alone, compared with the joint calibration.
+//! Repeatability, from a comparison of each recording calibrated alone with the joint calibration.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -19,7 +19,7 @@ pub struct Repeatability {
     pub claimed: f64,
     /// χ² of the deviations per degree of freedom; one if the σ are correct.
     pub chi_square: f64,
-    /// Limit at a false-alarm rate of 0.1 %.
+    /// Limit of χ² per degree of freedom, for a false-alarm rate of 0.1 %.
     pub limit: f64,
 }
 

@@ -1,10 +1,10 @@
-//! Average over effects that may be absent and whose size is not known: error terms, temperature orders.
+//! Average over effects that may be absent and whose size is not known, such as error terms and temperature orders.
 //!
-//! A group of constants is absent with a prior probability, usually one half; otherwise it has its usual size, known to a factor of
-//! three. The posterior of all constants is the average over these cases. With many groups, the average is found as in
+//! A group of constants is absent with a prior probability, usually one half; otherwise it has its usual size, known to
+//! a factor of three. The posterior of all constants is the average over these cases. With many groups, the average is found as in
 //! expectation propagation (Minka 2001, "Expectation propagation for approximate Bayesian inference", UAI 17): each
 //! group gets the normal prior about zero for which its mean equals that of the average over its own cases, given the
-//! priors of all others. The covariance is then that within the cases plus that between the cases.
+//! priors of all others. The covariance is then the covariance within the cases plus the covariance between the cases.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -21,7 +21,7 @@ const SIZES: [(f64, f64); 7] = [
     (3.0, 2.0 / 16.0),
     (5.196_152_422_706_632, 1.0 / 16.0),
 ];
-/// The largest size over the usual one.
+/// The largest size divided by the usual size.
 pub const LARGEST: f64 = SIZES[6].0;
 /// Smallest variance of a prior: an absent constant is zero to a millionth of its usual size.
 const NOTHING: f64 = 1e-12;
@@ -53,7 +53,8 @@ struct Moments {
 }
 
 impl Average {
-    /// Every group present with this size over the usual one, and its prior probability of absence.
+    /// A start in which every group is present, with this size divided by the usual size, and its prior probability of
+    /// absence.
     pub fn begun(groups: &[Vec<usize>], sizes: &[f64], prior_absent: Vec<f64>) -> Self {
         let n = groups.iter().map(Vec::len).sum();
         let mut precision = DMatrix::zeros(n, n);
@@ -70,8 +71,9 @@ impl Average {
         }
     }
 
-    /// The average, given the information of the data on all groups, each with its positions among the constants,
-    /// starting from this average; `None` if the covariance of a group is not positive definite.
+    /// The average, given the information from the data on all groups, computed from this average as a start. Each
+    /// group is given by its positions among the constants. `None` if the covariance of a group is not positive
+    /// definite.
     pub fn given(mut self, data: &Information, groups: &[Vec<usize>]) -> Option<Self> {
         for _ in 0..ROUNDS {
             let mut now = self.moments(data)?;

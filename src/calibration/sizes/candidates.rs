@@ -1,4 +1,4 @@
-//! Constants that may be absent, averaged over absence and their sizes.
+//! Averaging over the absence and the sizes of constants that may be absent.
 
 use nalgebra::{DMatrix, DVector};
 

@@ -43,11 +43,11 @@ struct Size {
 /// Distance of a linearisation point from the estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stage {
-    /// Errors of the linearisation dominate the residuals.
+    /// The point is far: errors of the linearisation dominate the residuals.
     Far,
-    /// Near for the first time.
+    /// The point is near for the first time.
     FirstNear,
-    /// Near, as in the previous pass.
+    /// The point is near, as in the previous pass.
     Near,
 }
 
@@ -72,7 +72,7 @@ pub struct Weighed<'a> {
 }
 
 impl Effects {
-    /// The sizes as stated.
+    /// The stated sizes.
     pub fn new(problem: &Problem) -> Self {
         let constants = Constant::all(&problem.model, problem.one_gravity());
         Self {
@@ -85,7 +85,7 @@ impl Effects {
         }
     }
 
-    /// Improves the sizes at a linearisation point, in several rounds once the point is near.
+    /// Improves the sizes at a linearisation point; once the point is near, in several rounds.
     ///
     /// # Errors
     /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
@@ -233,7 +233,7 @@ impl Effects {
         })
     }
 
-    /// Does the same as [`Self::weighed`] for some of the rows; the candidates are averaged again.
+    /// Does the same as [`Self::weighed`] for some of the rows, and averages the candidates again.
     ///
     /// # Errors
     /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
@@ -250,7 +250,8 @@ impl Effects {
         anew.weighed(chain, problem, script)
     }
 
-    /// Variances, divided by those with which the links of a chain are made; with stated noise, there are no slips.
+    /// Variances, divided by the variances with which the links of a chain are made; with stated noise, slips are
+    /// excluded.
     pub fn sizes(&self, chain: &Chain) -> Sizes {
         if self.at_rest.is_empty() && self.between.is_empty() {
             let slips = chain.states.slips.is_some();
@@ -278,7 +279,7 @@ impl Effects {
             .for_each(|size| size.usual.set(model, log(size)));
     }
 
-    /// A model with all sizes.
+    /// A copy of the model that contains all sizes.
     pub fn model(&self, stated: &Model) -> Model {
         let mut model = stated.clone();
         self.set(&mut model, |size| size.log);

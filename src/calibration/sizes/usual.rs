@@ -21,7 +21,7 @@ const DIFFERENCE: f64 = 0.1;
 pub enum What {
     /// A source of noise.
     Noise(Source),
-    /// The time in which a table settles.
+    /// The time constant with which a table settles.
     SettlingTime,
     /// The difference between recordings of a group of parameters.
     Difference(Group),
@@ -31,7 +31,7 @@ pub enum What {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Usual {
     pub what: What,
-    /// Usual size in SI and radians; for a difference, as a fraction of the prior σ of each parameter.
+    /// Usual size in SI units and radians; for a difference, a fraction of the prior σ of each parameter.
     pub sigma: f64,
     /// 1σ of its logarithm.
     pub spread: f64,
@@ -91,7 +91,7 @@ impl Usual {
         })
     }
 
-    /// The effect of the chain that this size scales; `None` if the source acts within dwells alone.
+    /// The effect of the chain that this size scales; `None` if the source acts only within dwells.
     pub fn effect(&self) -> Option<Effect> {
         match self.what {
             What::SettlingTime => None,

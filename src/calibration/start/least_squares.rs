@@ -23,8 +23,8 @@ pub struct Solution {
 }
 
 impl Equations {
-    /// Least-squares δθ with the prior and rows weighted by their variances, increased by the Birge ratio: if noise is
-    /// understated, rows must not move parameters that they hardly show far from the prior.
+    /// Least-squares δθ with the prior, where rows are weighted by their variances times the Birge ratio. If the noise
+    /// is understated, rows must not move parameters that they hardly show far from the prior.
     ///
     /// # Errors
     /// [`CalibrationError::Singular`] with the triad of an unknown that is not a number.
@@ -93,7 +93,8 @@ impl Equations {
         })
     }
 
-    /// Covariance of δθ due to the errors of rows that are weighted by other variances; `None` as for [`Self::solved`].
+    /// Covariance of δθ due to the errors of rows whose weights follow from other variances; `None` as in
+    /// [`Self::solved`].
     pub fn by_errors(&self) -> Option<ParameterMatrix> {
         let (_, gain) = self.with_prior(&self.weighted_factor(), 1.0)?;
         Some(self.whole(&(&gain * self.scores() * &gain)))

@@ -1,9 +1,9 @@
 //! Gyro bias proportional to the square of specific force along its axis, for example from a suspension or resonator
 //! that yields under load.
 //!
-//! Source: IEEE Std 528-2019, acceleration-squared-sensitive drift rate (second power of one component).
-//! Products of two components are not included. Neither is |f|², which is the same in every dwell on Earth and
-//! therefore part of the bias.
+//! Source: IEEE Std 528-2019, acceleration-squared-sensitive drift rate (second power of one component). Products of
+//! two components are not included, nor is |f|², which is the same in every dwell on Earth and is therefore part of the
+//! bias.
 
 use super::entry::{PER_AXIS, REFERENCE_RATE, TermEntry};
 use crate::imu::Sensor;

@@ -1,5 +1,5 @@
-//! Dependence of a gyro's scale factor on the magnitude of its rate: odd in the rate, of second and
-//! third order.
+//! Dependence of a gyro's scale factor on the magnitude of the rate, by terms of second and third order that are odd in
+//! the rate.
 
 use super::entry::{Columns, REFERENCE_RATE, Sensed, TermEntry};
 use super::gyro_second_order;

@@ -1,4 +1,4 @@
-//! Gyro output proportional to the square of its rate: even in the rate, like an asymmetry.
+//! Gyro output proportional to the square of the rate; like an asymmetry, this term is even in the rate.
 
 use super::asymmetry;
 use super::entry::{PER_AXIS, REFERENCE_RATE, TermEntry};

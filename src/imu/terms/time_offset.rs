@@ -1,5 +1,5 @@
-//! Accelerometer samples refer to a time q later than gyro samples, in s: if the body stays in place and rotates by θ
-//! in that time, the samples are `exp(−[θ×]) f`, or `f − q (ω − ω_ie) × f` to first order.
+//! Accelerometer samples refer to a time that is q seconds later than that of the gyro samples. If the body stays in
+//! place and rotates by θ during q, the samples are `exp(−[θ×]) f`, or `f − q (ω − ω_ie) × f` to first order.
 
 use nalgebra::Vector3;
 

@@ -1,4 +1,4 @@
-//! Motion along a trajectory in steps as long as smoothness permits.
+//! Motion along a trajectory, in steps as long as the smoothness of the motion permits.
 
 use std::convert::Infallible;
 
@@ -37,7 +37,7 @@ impl Stride {
     }
 }
 
-/// Motion along a trajectory in steps that end at its breaks and resolve the motion between them.
+/// Motion along a trajectory, in steps that end at its discontinuities and resolve the motion between them.
 #[derive(Debug, Clone)]
 pub struct Strides<'a> {
     trajectory: &'a Trajectory,

@@ -1,4 +1,4 @@
-//! Significance limits for faults: required improbability of samples in a faultless recording.
+//! Significance limits for faults: how improbable samples must be in a faultless recording.
 
 use statrs::distribution::{ContinuousCDF, Normal};
 

@@ -1,4 +1,4 @@
-//! Faulty rows that the other rows reveal.
+//! Search for faulty rows by comparison with the other rows.
 
 use std::ops::Range;
 

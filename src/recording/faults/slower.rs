@@ -1,4 +1,4 @@
-//! Parts of a recording with a lower row rate: the same number of rows is missing at each place.
+//! Detection of parts of a recording with a lower row rate, in which the same number of rows is missing at each place.
 
 use std::f64::consts::LN_2;
 use std::ops::Range;
@@ -10,25 +10,25 @@ use crate::recording::ImuSamples;
 /// A part of a recording with a lower row rate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Slower {
-    /// The samples from the first one without a row to the last.
+    /// The samples from the first one without a row to the last one without a row.
     pub samples: Range<usize>,
     /// Line of the row before these samples.
     pub line: u64,
     /// Number of samples from one row to the next.
     pub step: usize,
-    /// Number of places between rows.
+    /// Number of places with missing samples between rows.
     pub places: usize,
     /// Number of these places that are bridged.
     pub bridged: usize,
 }
 
 impl Slower {
-    /// Whether this fault is one of the places of this part.
+    /// Whether this fault is one of the places in this part.
     pub fn holds(&self, fault: &Fault) -> bool {
         fault.kind == FaultKind::Missing && self.samples.contains(&fault.samples.start)
     }
 
-    /// The samples that have no row.
+    /// Number of samples that have no row.
     pub fn missing(&self) -> usize {
         self.places * (self.step - 1)
     }

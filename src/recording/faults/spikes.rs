@@ -1,4 +1,4 @@
-//! Spikes: single samples that match neither side.
+//! Detection of spikes, which are single samples that match neither the preceding nor the following samples.
 
 use rayon::prelude::*;
 
@@ -17,8 +17,8 @@ const FEWEST: usize = TRIALS / 4;
 /// Number of samples examined on one side.
 const SIDE: usize = TRIALS + LINES[LINES.len() - 1];
 
-/// For each column, the rows that deviate from lines on both sides by more than in a faultless recording. `steps` are
-/// the smallest differences of values in the columns.
+/// For each column, the rows that deviate from the lines on both sides by more than rows of a faultless recording do.
+/// `steps` are the smallest differences of values in the columns.
 ///
 /// A sample belongs to the motion if the line from before or from after fits it, or if the sample lies between the two
 /// lines: then a turn started or ended there. The error of a line is measured on the surrounding samples, and therefore

@@ -36,7 +36,7 @@ impl Packed {
         self.steps.abs().mean()
     }
 
-    /// A range of samples, which must exist.
+    /// Returns a range of samples, which must exist.
     pub fn part(&self, samples: Range<usize>) -> Vec<Vector3<f64>> {
         let mut part = Vec::with_capacity(samples.len());
         let mut axes = [[0i64; FRAME]; 3];
@@ -61,7 +61,7 @@ impl Packed {
     }
 }
 
-/// Packer for samples of three axes, one by one.
+/// Packs samples of three axes one by one.
 #[derive(Debug)]
 pub struct Packer {
     /// Step of each axis, in the input quantity.

@@ -1,4 +1,4 @@
-//! Columns impossible for a working instrument.
+//! Detection of columns that a working instrument cannot produce.
 
 use nalgebra::Vector3;
 use statrs::function::erf::erf;
@@ -11,7 +11,7 @@ use crate::statistics::FALSE_ALARM;
 /// Reports axes whose values equal those of another axis in every row.
 ///
 /// Each axis has its own noise, so even two axes with the same input differ. An axis that never changes is not
-/// reported: it may be at rest with coarse pulses.
+/// reported, because it may be at rest with coarse pulses.
 pub fn copied(run: &Run) -> Option<String> {
     let pairs = listed(run, |sensor, rows| {
         let alike = |&(one, other): &(usize, usize)| {

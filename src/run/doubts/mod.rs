@@ -1,4 +1,4 @@
-//! Checks of a run on input. They report unusual but possible facts.
+//! Checks of a run when it is read, which report unusual but possible facts.
 
 pub mod clock;
 mod columns;
@@ -24,8 +24,7 @@ impl Run {
         checks.iter().filter_map(|check| check(self)).collect()
     }
 
-    /// A sentence on the true order of the table's quaternions, or on their inverse, if gravity contradicts the stated
-    /// order.
+    /// A sentence on the true order or direction of the table quaternions, if gravity contradicts the stated one.
     pub fn table_quaternions(&self) -> Option<String> {
         quaternions::order(self)
     }
@@ -40,8 +39,8 @@ fn gravity(run: &Run) -> Option<String> {
     (site.is_known && off.abs() > limit).then(|| {
         format!(
             "gravity_m_s2 = {} is {:.0} mGal {} normal gravity at latitude {}°, height {:.0} m (limit {:.0} mGal, \
-             false-alarm rate 0.1 %). This difference goes directly into the accelerometer scale factors. Check \
-             gravity_m_s2, latitude_deg and height_m.",
+             false-alarm rate 0.1 %). This difference changes the accelerometer scale factors by the same proportion. \
+             Check gravity_m_s2, latitude_deg and height_m.",
             value(site.gravity, 1e-4),
             off.abs() / MILLIGAL,
             if off > 0.0 { "above" } else { "below" },

@@ -1,4 +1,4 @@
-//! Table quaternions in a different order, or of the inverse rotation.
+//! Detection of table quaternions that are in a different order or describe the inverse rotation.
 
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 

@@ -33,9 +33,9 @@ pub struct LabelCheck {
     pub segment: Segment,
     /// Result of the comparison.
     pub verdict: Verdict,
-    /// Disagreement between label and recording, worded to follow `section … `.
+    /// Description of the disagreement between label and recording, worded so that it can follow `section … `.
     pub disagreement: Option<String>,
-    /// The samples that agree with the label, if any.
+    /// The samples that agree with the label, if there are any.
     pub as_labelled: Option<Range<usize>>,
 }
 
@@ -48,7 +48,7 @@ pub enum Verdict {
     Position {
         /// Angle between the measured and the labelled up direction, rad.
         off: f64,
-        /// Time for which the section moves, s.
+        /// Time for which the instrument moves in the section, s.
         moving: f64,
     },
     /// The label is a turn.

@@ -8,8 +8,8 @@ use turncal::calibration::result::Calibration;
 use turncal::calibration::{Finding, Level};
 use turncal_report::terminal::printable;
 
-/// Reads a calibration, at a temperature in °C if one is given. Refuses a calibration whose verdict is FAILED; with
-/// `force`, warns on standard error instead.
+/// Reads a calibration; if a temperature in °C is given, evaluates the calibration at this temperature. Refuses a
+/// calibration whose verdict is FAILED; with `force`, warns on standard error instead.
 pub fn usable(path: &Path, temperature: Option<f64>, force: bool) -> anyhow::Result<Calibration> {
     let record = turncal_files::read_calibration(path)?;
     if record.is_failed() {

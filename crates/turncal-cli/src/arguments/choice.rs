@@ -60,7 +60,7 @@ pub const FORMS: [Choice<InstallationForm>; 3] = [
     ),
 ];
 
-/// Observations of the filter.
+/// Kinds of observation that the filter can use.
 pub const AIDINGS: [Choice<Aiding>; 2] = [
     (
         "table",
@@ -74,7 +74,7 @@ pub const AIDINGS: [Choice<Aiding>; 2] = [
     ),
 ];
 
-/// Policies for the noise of the filter. A name without a description is not listed.
+/// Policies for the noise used by the filter. Names without a description are not listed in the help.
 pub const NOISE: [Choice<NoisePolicy>; 4] = [
     (
         "stated",

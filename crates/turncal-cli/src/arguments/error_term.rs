@@ -56,7 +56,7 @@ pub fn needs_table(term: ErrorTerm, aiding: Option<Aiding>) {
     }
 }
 
-/// Fails if a run lacks what an error term needs.
+/// Fails if a run lacks the data that an error term needs.
 pub fn supported(term: ErrorTerm, problem: &Problem) -> anyhow::Result<()> {
     if !problem.model.can_have(term) {
         bail!(

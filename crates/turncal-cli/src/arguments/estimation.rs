@@ -23,8 +23,8 @@ pub struct Estimation {
     /// Observations used by the filter [default: table if the run has a table log, otherwise velocity]
     #[arg(long, value_parser = one_of(&AIDINGS))]
     aiding: Option<Aiding>,
-    /// Error terms in addition to those switched on in run.toml. auto: averages over the absence and the usual sizes of
-    /// every term; none: only K, E and D; or names of terms to estimate in any case [default: auto]
+    /// Error terms in addition to those switched on in run.toml. auto: average over the absence and the usual sizes of
+    /// every term; none: only K, E and D; or the names of terms to estimate in any case [default: auto]
     #[arg(long, value_name = "TERM", value_parser = with_value(), value_delimiter = ',')]
     #[serde(serialize_with = "With::names")]
     with: Vec<With>,
@@ -34,7 +34,7 @@ pub struct Estimation {
 }
 
 impl Estimation {
-    /// Exits if arguments exclude each other.
+    /// Exits if two arguments exclude each other.
     pub fn check(&self) {
         With::check(&self.with);
         let first = With::terms(&self.with).next();
@@ -82,7 +82,7 @@ impl Estimation {
         Ok(problem)
     }
 
-    /// The options, without checks that need a run.
+    /// The options, without the checks that need a run.
     pub fn options(&self) -> Options {
         Options {
             form: self.installation,

@@ -47,7 +47,7 @@ pub struct OfLog {
 }
 
 impl OfLog {
-    /// Stream name and statements.
+    /// The stream name and the user's statements about the log.
     pub fn stated(&self) -> anyhow::Result<(Option<&str>, Stated)> {
         let stated = Stated {
             accel_file: self.accel_file.as_deref().map(DataFile::from),
@@ -68,7 +68,7 @@ impl OfLog {
         self.open_with(path, |found| show_found(path, found))
     }
 
-    /// Reads several logs of one sensor, each of one position; `None` if it was turned in one.
+    /// Reads several logs of one sensor, each recorded in one position; `None` if the sensor was turned in any of them.
     pub fn open_positions(&self, paths: &[PathBuf]) -> anyhow::Result<Option<Vec<Opened>>> {
         let (stream, stated) = self.stated()?;
         let stated = (stream, &stated);
@@ -108,7 +108,7 @@ pub fn run_file(text: &str) -> Result<PathBuf, String> {
     }
 }
 
-/// Path of a run.toml or a log, or `-`; for a run directory, the error gives the file in it.
+/// Path of a run.toml or a log, or `-`; for a run directory, the error message names the file in the directory.
 pub fn run_or_log(text: &str) -> Result<PathBuf, String> {
     let path = Path::new(text);
     let inside = path.join("run.toml");

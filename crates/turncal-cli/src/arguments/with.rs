@@ -14,7 +14,7 @@ pub enum With {
     Auto,
     /// K, E and D alone.
     None,
-    /// This term, whatever the data indicate.
+    /// This term, estimated whatever the data indicate.
     Term(ErrorTerm),
 }
 
@@ -62,7 +62,7 @@ impl With {
         clap::Error::raw(ErrorKind::ArgumentConflict, message).exit();
     }
 
-    /// Writes the values by name. Auto is an empty list, as without `--with`, because both describe the same job.
+    /// Writes the names of the values. Auto is an empty list, as without `--with`, because both describe the same job.
     pub fn names<S: Serializer>(all: &[Self], serializer: S) -> Result<S::Ok, S::Error> {
         let stated = all.iter().filter(|of| **of != Self::Auto);
         serializer.collect_seq(stated.map(|of| of.name()))

@@ -1,4 +1,4 @@
-//! `turncal calibrate --follow`: evaluates rows as they arrive, until they suffice or no more rows arrive.
+//! `turncal calibrate --follow`: evaluates rows as they arrive, until the accuracy suffices or no more rows arrive.
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -29,13 +29,13 @@ pub struct Follow<'a> {
     /// A growing file, `-` or a device.
     pub source: &'a Path,
     pub of_log: &'a OfLog,
-    /// The run.toml of the rows; rows of a pipe or a device are saved in the log file given there.
+    /// The run.toml that describes the rows; rows of a pipe or a device are saved in the log file given there.
     pub run: Option<&'a Path>,
     pub options: Options,
     pub specification: Option<Specification>,
     /// File in which the rows of a pipe or a device are saved.
     pub keep: Option<&'a Path>,
-    /// Time without growth after which a file is complete.
+    /// Time without growth after which a file counts as complete.
     pub patience: Duration,
     /// Whether standard output is reserved for the result.
     pub silent: bool,

@@ -71,7 +71,7 @@ impl Incoming {
         })
     }
 
-    /// Waits for bytes; false at the end.
+    /// Waits for bytes; returns false at the end of the source.
     pub fn wait(&mut self, most: Duration) -> anyhow::Result<bool> {
         match &mut self.kind {
             Kind::Growing { grew, patience } => {
@@ -107,7 +107,7 @@ impl Incoming {
         }
     }
 
-    /// Keeps the last line, complete or not.
+    /// Keeps the last line, whether it is complete or not.
     pub fn end(&mut self) -> anyhow::Result<()> {
         match &mut self.kind {
             Kind::Growing { .. } => Ok(()),
@@ -134,7 +134,7 @@ impl Incoming {
         Ok(())
     }
 
-    /// Number of lines that were not kept, and the first reasons; `None` if there are none.
+    /// Number of lines that were not kept, with the reasons for the first of them; `None` if all lines were kept.
     pub fn left_out(&self) -> Option<String> {
         match &self.kind {
             Kind::Growing { .. } => None,
@@ -199,7 +199,7 @@ fn read_in_background(source: PathBuf) -> anyhow::Result<Receiver<Option<Vec<u8>
                     return;
                 }
                 tell!(
-                    "{}: gone; waiting for it to return (Ctrl-C stops)",
+                    "{} has disappeared; waiting until it returns (Ctrl-C stops)",
                     source.display()
                 );
             }

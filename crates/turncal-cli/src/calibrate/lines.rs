@@ -1,4 +1,4 @@
-//! Lines of a pipe or a device as they arrive, without those that are not rows of the log.
+//! Lines of a pipe or a device as they arrive, without the lines that are not rows of the log.
 
 use std::mem;
 
@@ -15,9 +15,9 @@ const MOST_HELD: usize = 64;
 const MOST_NAMED: usize = 5;
 
 /// Reason for omitting the first line of a device.
-const CUT: &str = "perhaps only the end of a row";
+const CUT: &str = "the line may be only the end of a row";
 
-/// Holds back the first lines until several rows are alike; from then on, keeps only rows of that kind.
+/// Holds back the first lines until several rows have the same layout; from then on, keeps only rows with this layout.
 #[derive(Default)]
 pub struct Lines {
     begin_anywhere: bool,
@@ -37,12 +37,12 @@ pub struct Lines {
 #[derive(Default)]
 pub struct LeftOut {
     pub count: usize,
-    /// Number in the order of arrival and reason of the first ones.
+    /// The first such lines: their number in the order of arrival, and the reason.
     pub named: Vec<String>,
 }
 
 impl LeftOut {
-    /// Number of lines and the first reasons; `None` if there are none.
+    /// Number of these lines, with the reasons for the first of them; `None` if there are no such lines.
     pub fn text(&self) -> Option<String> {
         let mut named = self.named.join("; ");
         if self.count > self.named.len() {
@@ -70,7 +70,7 @@ impl Lines {
         }
     }
 
-    /// Adds bytes; returns those to keep.
+    /// Adds bytes; returns the bytes to keep.
     ///
     /// # Errors
     /// If the rows do not continue those of the file.
@@ -86,7 +86,7 @@ impl Lines {
         Ok(kept)
     }
 
-    /// The device is gone: its last row is incomplete.
+    /// Call this when the device has disappeared: its last row is incomplete.
     pub fn interrupt(&mut self) {
         self.is_cut = self.begin_anywhere;
         if !self.pending.is_empty() {

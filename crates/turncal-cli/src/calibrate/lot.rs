@@ -204,7 +204,7 @@ fn unit_names(runs: &[PathBuf]) -> anyhow::Result<Vec<String>> {
     }
     let twice = (0..full.len()).find(|&k| full[..k].contains(&full[k]));
     let twice = twice.map_or_else(String::new, |k| runs[k].display().to_string());
-    bail!("{twice}: found this run twice, expected each unit once. Remove one")
+    bail!("{twice}: found this run twice, expected each unit only once. Remove one")
 }
 
 #[cfg(test)]

@@ -15,8 +15,8 @@ use turncal_report::Document;
 
 /// Merges the parts of a sharded job; the result is identical to a single run
 ///
-/// Parts are directories of a lot or a study, written with --shard. Their order, their number and the machines do not
-/// matter; missing or duplicate runs and parts of a different job are refused.
+/// Parts are directories of a lot or a study, written with --shard. The order and number of the parts, and the machines
+/// that wrote them, do not matter. Missing or duplicate runs and parts of a different job are refused.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:
   turncal study accuracy --runs 500 --shard 1/2 -o part-1

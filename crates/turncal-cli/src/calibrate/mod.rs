@@ -50,16 +50,18 @@ const FOLLOWING: &str = "Following a log";
 /// Writes DIR/calibration.json and DIR/report/, and prints a summary. Exit status: 0 if the values may be used, 1 if
 /// they must not (FAILED), 3 if --require or a specification is not met.
 ///
-/// With --temperature, parameters depend on the temperature column; for a recording in one attitude, only biases do.
+/// With --temperature, parameters depend on the temperature column; for a recording in one attitude, only the biases
+/// depend on temperature.
 ///
-/// A campaign.toml lists several recordings of one instrument. They are calibrated jointly: parameters may depend on
-/// temperature and differ from day to day.
+/// A campaign.toml lists several recordings of one instrument. These recordings are calibrated jointly: parameters may
+/// depend on temperature and differ from day to day.
 ///
-/// Several logs, in each of which a sensor lies still in one position, are one recording of that sensor.
+/// Several logs of a sensor that lies still in one position per log are treated as one recording of that sensor.
 ///
-/// Several run.toml (or, with --lot, logs) are the units of a lot: each is calibrated into DIR/units/NAME/, and DIR/lot.json, lot.csv and
-/// index.html summarise the lot. Units that fail are listed with the reason; the command then fails after writing
-/// everything. The same command, run again, processes only missing or changed units.
+/// Several run.toml files (or, with --lot, logs) are the units of a lot. turncal writes the calibration of each unit
+/// into DIR/units/NAME/ and a summary of the lot into DIR/lot.json, lot.csv and index.html. Units that fail are listed
+/// with the reason; the command then fails after writing everything. If you run the same command again, it processes
+/// only missing or changed units.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal calibrate imu.csv --latitude 48.1 --sensor bmi088
@@ -98,7 +100,7 @@ pub struct Calibrate {
     /// Parameters that must be determined; otherwise the exit status is 3
     #[arg(long, value_name = "PARAMETERS", value_parser = one_of(&REQUIRED), value_delimiter = ',', conflicts_with_all = ["specification", "shard"])]
     require: Vec<&'static str>,
-    /// Take each run as a unit of a lot, also logs of a sensor that lies still
+    /// Treat each run as a unit of a lot, including logs of a sensor that lies still
     #[arg(long, conflicts_with_all = ["follow", "truth", "temperature"])]
     lot: bool,
     /// Limits for the units of a lot (a specification.toml)
@@ -111,12 +113,12 @@ pub struct Calibrate {
     /// specification can be decided, no more rows arrive, or Ctrl-C is pressed
     #[arg(long, conflicts_with_all = ["shard", "temperature", "truth"], help_heading = FOLLOWING)]
     follow: bool,
-    /// File in which rows from standard input (-) or a device are saved; an existing file must contain rows of the same
-    /// kind, and is continued [default: follow-TIME.csv]
+    /// File in which rows from standard input (-) or a device are saved; new rows are added to an existing file, which
+    /// must contain rows of the same kind [default: follow-TIME.csv]
     #[arg(long, value_name = "FILE", requires = "follow", help_heading = FOLLOWING)]
     keep: Option<PathBuf>,
-    /// run.toml that describes the rows; rows from standard input (-) or a device are saved in the log file given
-    /// there, which must be new
+    /// run.toml that describes the rows; rows from standard input (-) or a device are saved in the log file that it
+    /// names, which must not exist yet
     #[arg(long, value_name = "RUN.toml", requires = "follow", conflicts_with = "keep", value_parser = run_file, help_heading = FOLLOWING)]
     run: Option<PathBuf>,
     /// Time without growth after which a followed file is complete, s
@@ -192,7 +194,7 @@ impl Calibrate {
         let message = if self.truth.is_some() {
             "--truth applies to one run; to compare units of a lot with their truths, use turncal compare\n"
         } else if !self.require.is_empty() {
-            "--require applies to one run; for the units of a lot, give a --specification\n"
+            "--require applies to one run; for the units of a lot, use --specification\n"
         } else {
             return self.lot();
         };
@@ -363,10 +365,12 @@ impl Calibrate {
         calibration: Calibration,
     ) -> anyhow::Result<()> {
         if !solution.converged() {
-            bail!("{name}: not converged; do not use the values or σ, see the findings");
+            bail!(
+                "{name}: the calibration did not converge; do not use the values or σ, and see the findings"
+            );
         }
         if !solution.is_usable() {
-            bail!("{name}: do not use the values, see the findings");
+            bail!("{name}: do not use the values; see the findings");
         }
         self.check_required(name, &calibration)?;
         self.decide(name, calibration)
@@ -448,7 +452,7 @@ fn say(recording: &Recording) {
     }
 }
 
-/// Solves a problem and shows the passes.
+/// Solves a calibration problem and shows each pass.
 pub fn solve(problem: &Problem, method: Method, activity: &Activity) -> anyhow::Result<Solution> {
     let name = &problem.run().recording.name;
     activity.next(format!("calibrating {name}"));

@@ -11,7 +11,7 @@ use turncal::survey::Status;
 use turncal_report::session;
 use turncal_report::terminal::{printable, wrapped};
 
-/// Output: a screen that is redrawn on a terminal, otherwise a line for each dwell.
+/// Form of the output: on a terminal, a screen that is redrawn; otherwise, one line per dwell.
 pub struct Screen {
     is_terminal: bool,
     silent: bool,

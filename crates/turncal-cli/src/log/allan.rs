@@ -12,8 +12,8 @@ use turncal_report::allan;
 /// Computes the Allan deviation of a stationary recording and its noise figures
 ///
 /// Shows the overlapping Allan deviation of every axis with its confidence interval; random walk, bias instability,
-/// rate random walk, quantisation and ramp with σ if detected, otherwise with an upper limit; and a table [imu.noise]
-/// for run.toml. Uses the whole recording if it is stationary, otherwise its longest static interval.
+/// rate random walk, quantisation and ramp, with σ if they are detected and with an upper limit otherwise; and a table
+/// [imu.noise] for run.toml. Uses the whole recording if it is stationary, otherwise its longest static interval.
 #[derive(Debug, clap::Args)]
 #[command(mut_arg("output", |output| output.help("Directory for the report and figures")))]
 #[command(after_help = "Examples:

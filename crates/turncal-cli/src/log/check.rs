@@ -9,9 +9,10 @@ use turncal_report::check;
 
 /// Describes a run and the parameters that each method could observe
 ///
-/// Does not calibrate. Shows rate, jitter, faults and resolution of the log; dwells with their upward axis; turns with
-/// axis and angle; labelled sections compared with both; the predicted σ of each method and the parameters that the
-/// method would not observe; recommended changes. Problems in the run do not change the exit status.
+/// Does not calibrate. Shows the rate, jitter, faults and resolution of the log; dwells with their upward axis; turns
+/// with axis and angle; labelled sections compared with dwells and turns; the predicted σ of each method and the
+/// parameters that the method would not observe; and recommended changes. Problems in the run do not change the exit
+/// status.
 #[derive(Debug, clap::Args)]
 #[command(mut_arg("output", |output| output.help("Directory for the report and a figure of the recording")))]
 #[command(after_help = "Examples:

@@ -10,9 +10,9 @@ use turncal_logs::DataFile;
 
 /// Drafts a run.toml for a log
 ///
-/// Identifies the columns by name or value, the time unit, the sensor units (from gravity at rest and its change when
-/// the gyros turn), and the white noise at rest, and gives a reason for each guess. Fields that the log cannot show are
-/// marked TODO.
+/// Identifies the columns (by name or value), the time unit, the sensor units (from gravity at rest and from the change
+/// of gravity during turns) and the white noise at rest, and gives a reason for each guess. Fields that the log cannot
+/// show are marked TODO.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal init imu.csv

@@ -7,9 +7,9 @@ use turncal_report::conversion;
 
 /// Converts a noise figure to every convention: data sheets, Kalibr, PSINS, KF-GINS
 ///
-/// Each line gives the convention and its users. Densities are two-sided, as in IEEE Std 952; a one-sided density is √2
-/// times as large. A unit of rate or acceleration (deg/s, m/s^2) means noise per sample with --rate, and bias
-/// instability without.
+/// Each output line gives a convention and the data sheets or programs that use it. Densities are two-sided, as in IEEE
+/// Std 952; a one-sided density is √2 times as large. With --rate, a unit of rate or acceleration (deg/s, m/s^2) means
+/// noise per sample; without --rate, it means bias instability.
 #[derive(Debug, clap::Args)]
 #[command(after_help = format!("Examples:
   turncal noise 0.3 'deg/sqrt(h)'

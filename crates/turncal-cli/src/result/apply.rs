@@ -23,10 +23,10 @@ const SUSPECT_SIGMAS: f64 = 10.0;
 /// Converts the raw samples of a run to angular rate and specific force
 ///
 /// Writes one row per sample: start and end in s, angular rate in rad/s and specific force in m/s², both averaged over
-/// the sample, along right, front and up in the body frame of the calibration. Error terms of the calibration are also
-/// corrected, and so is temperature dependence if the run has a temperature; the correction of the time offset neglects
-/// Earth rate. The name of the last column is the verdict of the calibration, such as verdict_good; the column contains
-/// 1. The output can itself be the log of a run.toml: output = "rate", time_stamp = "end".
+/// the sample, along right, front and up in the body frame of the calibration. Also corrects the error terms of the
+/// calibration and, if the run has a temperature, the temperature dependence. The correction of the time offset
+/// neglects Earth rate. The last column is named after the verdict of the calibration, such as verdict_good, and
+/// contains the number one. The output can itself be the log of a run.toml: output = "rate", time_stamp = "end".
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal apply result/calibration.json run.toml -o calibrated.csv.gz
@@ -43,8 +43,8 @@ pub struct Apply {
     /// File to write, `.csv` or `.csv.gz` [default: standard output]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Interpolate missing rows and mark them with 1 in a column `filled`, except in gaps too long for calibrate to
-    /// bridge
+    /// Interpolate missing rows and mark them with 1 in a column `filled`, except in gaps that are too long for
+    /// calibrate to bridge
     #[arg(long)]
     fill: bool,
     /// Replace the output file if it exists, and apply a calibration even if its verdict is FAILED
@@ -63,7 +63,7 @@ impl Apply {
         let lost: usize = run.recording.imu.lost().iter().map(Range::len).sum();
         if let Some(missing) = run.recording.imu.missing().next().filter(|_| self.fill) {
             bail!(
-                "{}: {} rows are missing from {:.3} s on, too many to fill. Omit --fill, or split the log there",
+                "{}: {} rows are missing from {:.3} s on, too many to fill. Omit --fill, or split the log at this gap",
                 self.run.display(),
                 missing.len(),
                 run.recording.imu.time(missing.start)
@@ -173,8 +173,8 @@ fn notes(record: &Calibration, correction: &Correction, run: &Run) -> Vec<String
 fn of_temperature(thermal: &ThermalRecord, run: &Run) -> Vec<String> {
     let Some(temperature) = &run.recording.imu.temperature else {
         return vec![format!(
-            "the calibration depends on temperature, but the run has none: all rows are corrected for {} °C and have \
-             0 in in_range",
+            "the calibration depends on temperature, but the run has none: all rows are corrected for {} °C, and their \
+             column in_range is 0",
             thermal.range.gyro.reference
         )];
     };
@@ -185,7 +185,7 @@ fn of_temperature(thermal: &ThermalRecord, run: &Run) -> Vec<String> {
         is_beyond.then(|| {
             format!(
                 "{}: the run covers {lowest:.1} to {highest:.1} °C, but the calibration is valid for {:.1} to {:.1} \
-                 °C; rows outside have 0 in in_range",
+                 °C; for rows outside, the column in_range is 0",
                 sensor.name(),
                 range.lowest,
                 range.highest

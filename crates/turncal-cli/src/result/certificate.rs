@@ -37,7 +37,7 @@ pub struct Certificate {
     /// Limits for the parameters, applied with the decision rule in lab.toml
     #[arg(long, value_name = "specification.toml")]
     specification: Option<PathBuf>,
-    /// Earlier calibration, valid when the item was received
+    /// Earlier calibration, which was valid when the item was received
     #[arg(long, value_name = "EARLIER.json")]
     as_found: Option<PathBuf>,
     /// Directory to write

@@ -1,4 +1,4 @@
-//! `turncal compare`: calibrations side by side.
+//! `turncal compare`: comparison of calibrations.
 
 use std::path::{Path, PathBuf};
 
@@ -12,10 +12,10 @@ use turncal_report as report;
 
 /// Compares calibrations, parameter by parameter, with their σ
 ///
-/// All calibrations are first converted to the general misalignment form and one body frame. Differences are from the
-/// truth or, for two calibrations without a truth, from the first. For three or more, the mean, scatter and χ² of the
-/// scatter relative to the stated σ are also shown, and outliers are marked. A calibration whose verdict is FAILED is
-/// refused without --force.
+/// All calibrations are first converted to the general misalignment form and one body frame. Differences are relative
+/// to the truth or, for two calibrations without a truth, to the first calibration. For three or more, the mean,
+/// scatter and χ² of the scatter relative to the stated σ are also shown, and outliers are marked. A calibration whose
+/// verdict is FAILED is refused without --force.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  turncal compare monday.json friday.json --truth truth.json")]
 pub struct Compare {

@@ -12,10 +12,10 @@ use turncal_files::write_whole;
 
 /// Exports a calibration for other programs (Kalibr, PX4, ROS, C, …)
 ///
-/// Formats with inputs in rad/s and m/s² state the divisor of the raw output: the nominal scale of the unit; for
-/// counts, the nominal scale of --run, otherwise the calibrated scale factors rounded to three digits. The verdict of
-/// the calibration and the parts that the format cannot represent are stated in the file and on standard error (for
-/// realsense, which has no place for text, only on standard error).
+/// Formats with inputs in rad/s and m/s² state the divisor of the raw output. The divisor is the nominal scale of the
+/// unit; for counts, it is the nominal scale of --run or, without --run, the calibrated scale factors rounded to three
+/// digits. The verdict of the calibration and the parts that the format cannot represent are stated in the file and on
+/// standard error (for realsense, which has no place for text, only on standard error).
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal export result/calibration.json --format c -o imu.h

@@ -19,10 +19,10 @@ const LARGEST_PITCH: f64 = 89.0;
 
 /// Shows the navigation error due to the errors of a calibration
 ///
-/// Navigates with the instrument of --truth, corrected by the calibration, from perfect alignment and with the height
-/// fixed to the true height, at rest or along a trajectory. Shows the errors of attitude, velocity and position, and
-/// their σ predicted from the covariance of the calibration. A calibration whose verdict is FAILED is refused without
-/// --force.
+/// Navigates at rest or along a trajectory with the instrument of --truth, corrected by the calibration. Navigation
+/// starts with perfect alignment, and the height is fixed to the true height. Shows the errors of attitude, velocity
+/// and position, and their σ predicted from the covariance of the calibration. A calibration whose verdict is FAILED is
+/// refused without --force.
 #[derive(Debug, clap::Args)]
 #[command(mut_arg("output", |output| output.help("Directory for navigation.csv, figures and a page")))]
 #[command(after_help = "Examples:
@@ -33,7 +33,7 @@ const LARGEST_PITCH: f64 = 89.0;
   turncal navigate monday.json --truth friday.json \\
       --latitude-deg -33.9 --errors gyro --json")]
 pub struct Navigate {
-    /// The calibration that navigation uses
+    /// Calibration to use for navigation
     #[arg(value_name = "CALIBRATION.json")]
     calibration: PathBuf,
     /// The true parameters of the instrument: a truth.json or another calibration

@@ -50,7 +50,7 @@ pub struct Accuracy {
     /// Error terms to simulate and to estimate, in addition to those of the scenario [default: auto]
     #[arg(long, value_name = "TERM", value_parser = with_value(), value_delimiter = ',')]
     with: Vec<With>,
-    /// Error terms to simulate but not to estimate
+    /// Error terms that are simulated but not estimated
     #[arg(long, value_name = "TERM", value_parser = error_term(), value_delimiter = ',')]
     unmodelled: Vec<ErrorTerm>,
     /// Noise used by the filter; the noise stated in a scenario is correct

@@ -1,4 +1,4 @@
-//! Runs of a whole study.
+//! Runs all runs of a study.
 
 use std::ops::ControlFlow;
 use std::path::Path;

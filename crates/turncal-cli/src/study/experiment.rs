@@ -17,10 +17,11 @@ const SCENARIO: &str = "experiment";
 
 /// Simulates the turntable experiment of the paper: navigation accuracy after each calibration
 ///
-/// Simulates many instruments on a table with position errors, with noise and Gauss–Markov biases. Calibrates each with
-/// the closed form on the paper's static positions, and with the filter in a sixth of that table time and in the same
-/// table time, in all misalignment forms. Navigates with the remaining errors: at rest, with self-alignment or perfect
-/// alignment, and moving. Shows the position error of every method, and the parameters that cause it.
+/// Simulates many instruments on a table with position errors, with noise and Gauss–Markov biases. Calibrates each
+/// instrument in all misalignment forms: with the closed form on the paper's static positions, and with the filter in a
+/// sixth of that table time and in the same table time. Navigates with the remaining errors at rest (with
+/// self-alignment or perfect alignment) and while moving. Shows the position error of every method, and the parameters
+/// that cause it.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal study experiment

@@ -1,4 +1,4 @@
-//! Progress on a terminal; none if standard error is a file or a pipe.
+//! Progress display on a terminal; nothing is shown if standard error is a file or a pipe.
 
 use std::sync::mpsc::{self, RecvTimeoutError, Sender};
 use std::thread;
@@ -27,7 +27,7 @@ impl Activity {
         Self { bar, ticking }
     }
 
-    /// Shows the next activity.
+    /// Shows the next activity of the command.
     pub fn next(&self, message: impl Into<String>) {
         self.bar.set_message(printable(&message.into()));
     }

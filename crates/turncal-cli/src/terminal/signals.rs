@@ -74,6 +74,6 @@ fn is_ignored(signal: i32) -> bool {
     mask.is_some_and(|mask| mask >> (signal - 1) & 1 == 1)
 }
 
-/// On other systems, the next run cleans up.
+/// On other systems, the next run removes incomplete output.
 #[cfg(not(unix))]
 pub fn leave_nothing_behind() {}

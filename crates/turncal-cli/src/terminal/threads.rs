@@ -23,8 +23,8 @@ pub fn with_threads<T: Send>(work: impl FnOnce() -> T + Send) -> Result<T, Threa
     Ok(work())
 }
 
-/// Computes `count` pieces of work, one at a time per thread, so that at most one per thread is in memory. Results are
-/// in order.
+/// Computes `count` pieces of work. Each thread holds only one piece in memory at a time. The results are in the order
+/// of the pieces.
 pub fn piece_by_piece<T: Send>(count: usize, work: impl Fn(usize) -> T + Sync) -> Vec<T> {
     let next = AtomicUsize::new(0);
     let results: Mutex<Vec<(usize, T)>> = Mutex::new(Vec::with_capacity(count));

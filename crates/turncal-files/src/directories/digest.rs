@@ -42,7 +42,7 @@ fn digest_of_file(path: &Path) -> io::Result<String> {
 /// The files of a run, as named in its run.toml, each with its digest or, if unreadable, the system error. The run.toml
 /// comes first.
 ///
-/// For a campaign: its file, then those of each recording, in the order of their paths.
+/// For a campaign: its file, then the files of each recording, in the order of the recordings' paths.
 pub fn input_digests(run: &Path) -> Vec<(String, String)> {
     let file = table_of(run);
     let recordings = file.get("recording").and_then(Value::as_array);

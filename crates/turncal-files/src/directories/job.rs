@@ -10,7 +10,7 @@ use super::digest::digest_of;
 use turncal::study::Shard;
 use turncal_input::{FileError, small_file};
 
-/// The name of the file in its directory.
+/// The name of this file in its directory.
 pub const JOB_FILE: &str = "job.json";
 /// The version of the format.
 const FORMAT: &str = "turncal-job/1";
@@ -33,7 +33,7 @@ pub struct Job {
     /// Names of the runs of a lot.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub names: Vec<String>,
-    /// Specification for the results; does not change the result of a run.
+    /// Specification for the results, which does not change the result of a run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub specification: Option<turncal::lot::Specification>,
 }
@@ -58,10 +58,10 @@ pub struct Part {
     pub job: Job,
     /// SHA-256 of the job.
     pub digest: String,
-    /// The part; `None` for the whole job.
+    /// The part in this directory; `None` for the whole job.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shard: Option<Shard>,
-    /// Numbers of its runs, from zero; empty for the whole job.
+    /// Numbers of the part's runs, from zero; empty for the whole job.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub holds: Vec<u64>,
     /// SHA-256 of the file of results in the same directory.
@@ -102,7 +102,7 @@ impl Job {
         first_difference("", &decisive(self), &decisive(other))
     }
 
-    /// First difference of any kind.
+    /// The first difference of any kind between two jobs.
     pub fn any_difference(&self, other: &Self) -> Option<String> {
         let [one, other] = [self, other].map(|of| serde_json::to_value(of).unwrap_or_default());
         first_difference("", &one, &other)
@@ -144,7 +144,7 @@ impl Part {
         }
     }
 
-    /// Numbers of its runs.
+    /// Numbers of the runs in this job or part.
     pub fn held(&self) -> Vec<u64> {
         match self.shard {
             Some(_) => self.holds.clone(),
@@ -165,8 +165,8 @@ impl Part {
         };
         let is_lot = part.job.job == JobKind::Lot;
         if part.digest != digest_of(&part.job) || !is_whole || (is_lot && !named) {
-            let found = "a job whose digest or run list does not match";
-            let expected = "the job as turncal wrote it";
+            let found = "a job file whose digest or run list does not match its content";
+            let expected = "the job file as turncal wrote it";
             return Err(FileError::of(&path, found, expected, advice));
         }
         Ok(part)

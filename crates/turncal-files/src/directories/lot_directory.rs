@@ -95,7 +95,7 @@ impl LotDirectory {
         Ok(Self { root, _lock })
     }
 
-    /// The previously calibrated unit, if its inputs are unchanged.
+    /// The unit from an earlier run, if it was calibrated with the same inputs.
     pub fn kept(&self, name: &str, key: &str) -> Option<Unit> {
         let unit = read_unit(&self.root.join(UNITS).join(name), Some(key));
         Some(unit.ok()?.0)
@@ -175,7 +175,7 @@ fn check_same(target: &Path, found: &Part, expected: &Part) -> Result<(), FileEr
     });
     difference.map_or(Ok(()), |difference| {
         let found = format_args!("a lot started with other options ({difference})");
-        let expected = "the options of the job started here";
+        let expected = "a lot started with the options of this command";
         let advice = "Use the same options, choose another directory, or add --force to restart.";
         Err(FileError::of(target, found, expected, advice))
     })

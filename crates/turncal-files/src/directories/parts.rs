@@ -1,4 +1,4 @@
-//! Parts of a job: each is written by one machine, and one machine merges them.
+//! Parts of a job. Each part is written by one machine, and one machine merges all parts.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -101,7 +101,10 @@ impl Parts {
         {
             let (run, other) = (self.name(*run), other.display());
             let found = format_args!("run {run}, which is also in {other}");
-            let (expected, advice) = ("each run in one part only", "Leave out one of the two.");
+            let (expected, advice) = (
+                "each run in one part only",
+                "Leave out one of the two parts.",
+            );
             return Err(FileError::of(directory, found, expected, advice));
         }
         let missing = self.job.runs.saturating_sub(held.len() as u64);
@@ -175,7 +178,7 @@ impl Parts {
         Ok(all.into_iter().map(|(_, result)| result).collect())
     }
 
-    /// Name and part of every unit of a lot, in its order.
+    /// Name and part of every unit of a lot, in the order of the lot.
     pub fn units(&self) -> Vec<(&str, &Path)> {
         let mut all = self.held();
         all.sort();

@@ -9,7 +9,7 @@ use crate::Sheet;
 use crate::quantity::Of;
 use turncal::imu::{PerSensor, Sensor};
 
-/// Columns by index in the file.
+/// Columns, given by their index in the file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Columns {
     pub names: Vec<String>,
@@ -19,12 +19,12 @@ pub struct Columns {
     pub triads: PerSensor<Option<[usize; 3]>>,
     /// Other candidates for the triads.
     pub others: PerSensor<Vec<[usize; 3]>>,
-    /// Whether the triads were identified by value, because their names are not informative.
+    /// Whether the triads were identified by their values, because the column names are not informative.
     pub by_size: bool,
-    /// Why the triads that were identified by value are a guess.
+    /// Why triads identified by their values are only a guess.
     pub doubt: Option<Doubt>,
     pub temperature: Option<usize>,
-    /// Four columns with a norm of one.
+    /// Four columns whose norm is one (a quaternion).
     pub quaternion: Option<[usize; 4]>,
 }
 
@@ -164,13 +164,13 @@ fn distinct(names: &[String], column: usize) -> String {
     }
 }
 
-/// Columns that belong to this sensor by name.
+/// Columns whose names belong to this sensor.
 pub fn named(sheet: &Sheet, sensor: Sensor) -> Vec<usize> {
     let is = |k: &usize| Name::of(&sheet.names[*k]).sensor() == Some(sensor);
     (0..sheet.names.len()).filter(is).collect()
 }
 
-/// Whether gyros and accelerometers have separate rows, by their names.
+/// Whether the column names show that gyros and accelerometers have separate rows.
 pub fn have_rows_of_their_own(sheet: &Sheet) -> bool {
     let places = PerSensor::from_fn(|sensor| named(sheet, sensor));
     let (mut both, mut one) = (0, 0);
@@ -235,7 +235,7 @@ fn split_time(sheet: &Sheet, names: &[Name]) -> Option<[usize; 2]> {
     Some([pair, pair + 1])
 }
 
-/// The column that distinguishes several instruments, with its value for the first.
+/// The column that distinguishes several instruments, with its value for the first instrument.
 pub fn instance(sheet: &Sheet) -> Option<(usize, f64)> {
     let tells = |k: &usize| {
         let mut known: Vec<f64> = Vec::new();

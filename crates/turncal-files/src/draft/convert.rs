@@ -17,7 +17,7 @@ const ACCEL_FILE: &str = "accelerometers.csv.gz";
 
 impl Draft {
     /// Writes the streams of the instrument as text, with this draft for them, into an existing directory; a damaged
-    /// log is written only if its intact part is to be used.
+    /// log is written only if the user allows its intact part to be used.
     ///
     /// # Errors
     /// [`FileError`] if the log is already text, is damaged, or cannot be read or written.

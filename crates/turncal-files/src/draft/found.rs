@@ -23,7 +23,7 @@ pub struct Found {
 }
 
 impl Draft {
-    /// Detected fields, in display order.
+    /// All detected fields, in the order of the display.
     pub fn found(&self) -> Vec<Found> {
         vec![
             self.time_found(),
@@ -100,8 +100,8 @@ impl Draft {
             ))
         });
         let left_out = self.left_out.map(|_| {
-            "turncal left out the gyros, because their unit cannot be told: the sensor was not turned. For their \
-             biases, add --gyro-unit."
+            "turncal left out the gyros because their unit cannot be determined: the sensor was not turned. To \
+             estimate the gyro biases, add --gyro-unit."
                 .to_owned()
         });
         let of_clock = self.clock.doubt.clone().into_iter();
@@ -115,7 +115,7 @@ impl Draft {
                 "time",
                 "none",
                 Certainty::Guess,
-                "a row is the mean of a position",
+                "each row is the mean of one position",
             );
         }
         let name = self.columns.time.map(|k| self.columns.names[k].as_str());
@@ -142,7 +142,7 @@ impl Draft {
         let unit = self.quantities.units.get(sensor);
         if let Some(triad) = self.left_out.filter(|_| sensor == Sensor::Gyro) {
             let names = triad.map(|k| self.columns.names[k].as_str()).join(" ");
-            let why = "the sensor was not turned; add --gyro-unit for their biases";
+            let why = "the sensor was not turned; to estimate the gyro biases, add --gyro-unit";
             return Found::new(what, format!("{names}, left out"), Certainty::Unknown, why);
         }
         let Some(triad) = self.columns.triads.get(sensor) else {

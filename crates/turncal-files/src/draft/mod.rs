@@ -42,7 +42,7 @@ const FEWEST_AT_REST: usize = 64;
 const NO_COLUMNS: &str = "not recognised by name or values";
 const AXES_OF_PROGRAM: &str = "axis convention of the program that wrote the log";
 
-/// Information in a log about the instrument and its recording.
+/// Information about the instrument and its recording, found in a log.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Draft {
     /// Content of the streams, if the log has streams.
@@ -78,7 +78,7 @@ impl Draft {
     /// Examines a file of rows.
     ///
     /// # Errors
-    /// [`FileError`] if it cannot be read or has too few rows.
+    /// [`FileError`] if the file cannot be read or has too few rows.
     pub fn of_file(path: &Path) -> Result<Self, FileError> {
         Self::of_stream(&path.into(), None, &Stated::default())
     }
@@ -86,7 +86,7 @@ impl Draft {
     /// Examines one stream of a log, with statements about it.
     ///
     /// # Errors
-    /// [`FileError`] if it cannot be read or has too few rows.
+    /// [`FileError`] if the file cannot be read or has too few rows.
     pub fn of_stream(
         file: &DataFile,
         stream: Option<&str>,
@@ -130,24 +130,26 @@ impl Draft {
         let columns = &mut draft.columns;
         let PerSensor { gyro, accel } = columns.triads;
         if accel.is_none() || gyro.is_some() || columns.time.is_some() {
-            let expected = format!("at least {FEWEST_ROWS}, or the means of some positions");
-            let advice = "Record a run with dwells and turns, or give a table of accelerometer means, a row a position.";
+            let expected =
+                format!("at least {FEWEST_ROWS}, or the mean values of several positions");
+            let advice = "Record a run with dwells and turns, or give a table of accelerometer means with one row per \
+                          position.";
             return Err(FileError::of(file, found, expected, advice));
         }
         draft.of_means = true;
         Ok(draft)
     }
 
-    /// Whether the gravity direction stays the same, as in the log of one position.
+    /// Whether the gravity direction does not change, as in the log of one position.
     pub fn is_of_one_position(&self) -> bool {
         let stays = |motion: &Motion| !motion.is_turned && motion.cuts.is_empty();
         self.motion.as_ref().is_some_and(stays)
     }
 
-    /// Takes the units of another log of the same sensor.
+    /// Takes over the units of another log of the same sensor.
     ///
     /// # Errors
-    /// [`FileError`] if the columns are not those of the other log.
+    /// [`FileError`] if the columns differ from those of the other log.
     pub fn as_in(&mut self, file: &Path, other: &Self) -> Result<(), FileError> {
         let names = |of: &Self| of.columns.names.join(", ");
         if self.columns.names != other.columns.names {
@@ -165,7 +167,7 @@ impl Draft {
         Ok(())
     }
 
-    /// Leaves out gyros whose unit nothing shows: gravity alone calibrates the accelerometers.
+    /// Leaves out the gyros if nothing shows their unit; the accelerometers are then calibrated with gravity alone.
     pub fn leave_out_gyros(&mut self) {
         let knows = |sensor| self.quantities.units.get(sensor).word.is_some();
         if !knows(Sensor::Gyro) && knows(Sensor::Accel) && self.columns.triads.accel.is_some() {
@@ -177,7 +179,7 @@ impl Draft {
     /// in the draft.
     ///
     /// # Errors
-    /// [`FileError`] if a file cannot be read, has too few rows, or lacks its triad or its time.
+    /// [`FileError`] if a file cannot be read, has too few rows, or lacks its triad or a time.
     pub fn of_two_files(
         gyro: &DataFile,
         accel: &DataFile,
@@ -294,8 +296,11 @@ impl Draft {
             names.collect::<Vec<_>>().join(" ")
         });
         [
-            format!("gravity in {} and turns in {}", names.gyro, names.accel),
-            "rates and accelerations, as these columns are named".to_owned(),
+            format!(
+                "gravity in the columns {} and turns in the columns {}",
+                names.gyro, names.accel
+            ),
+            "rates and accelerations, according to the column names".to_owned(),
             "Exchange the two triads in the header of the log, or in columns of run.toml."
                 .to_owned(),
         ]

@@ -3,7 +3,7 @@
 use crate::quantity::{Of, spelled};
 use turncal::imu::Sensor;
 
-/// A `run.toml` unit, and the size of the file's unit expressed in it.
+/// A unit of `run.toml`, and the size of the file's unit in this unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unit {
     pub word: &'static str,
@@ -34,7 +34,7 @@ const OTHERS: [&str; 9] =
 /// A parsed name.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Name {
-    /// Letters and digits in lower case, without axis and unit.
+    /// Letters and digits of the name in lower case, without axis and unit.
     pub stem: String,
     /// The axis part.
     pub axis: Option<char>,
@@ -84,7 +84,7 @@ fn words(name: &str) -> Vec<String> {
 }
 
 impl Name {
-    /// For a column whose unit may be in a separate row.
+    /// Analyses the name of a column whose unit may be in a separate row.
     pub fn of_column(name: &str, unit_below: &str) -> Self {
         let mut of = Self::of(name);
         of.unit = of.unit.or_else(|| unit(unit_below));
@@ -133,7 +133,7 @@ impl Name {
         }
     }
 
-    /// The triad according to the stem; if the stem fits both, the unit decides.
+    /// The triad to which the stem of the name belongs; if the stem fits both triads, the unit decides.
     pub fn sensor(&self) -> Option<Sensor> {
         if self.is_of_another_sensor() {
             return None;
@@ -156,7 +156,7 @@ impl Name {
         self.unit.is_some_and(is_magnetic) || OTHERS.iter().any(|other| self.stem.contains(other))
     }
 
-    /// Similarity to a time column; larger is more similar.
+    /// How similar the name is to that of a time column; larger is more similar.
     pub fn is_time(&self) -> u8 {
         let whole = self.whole();
         let has = |parts: &[&str]| parts.iter().any(|part| whole.contains(part));
@@ -203,7 +203,7 @@ impl Name {
         names.contains(&&*self.whole())
     }
 
-    /// Tick in s, if the name defines it.
+    /// Duration of a tick in s, if the name defines it.
     pub fn tick(&self) -> Option<f64> {
         // Xsens, MT Low-Level Communication Protocol: 10 kHz.
         (self.whole() == "sampletimefine").then_some(1e-4)

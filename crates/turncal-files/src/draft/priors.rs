@@ -1,4 +1,5 @@
-//! Prior: scale and bias from the recording; the rest is typical of instruments with similar noise.
+//! The prior of a draft: scale and bias are estimated from the recording, and the other values are typical of
+//! instruments with similar noise.
 
 use nalgebra::Vector3;
 
@@ -96,7 +97,7 @@ impl Draft {
             Some(of) => format!("from the data sheet of {}", of.of),
             None => {
                 let class = class.name;
-                format!("typical for {class} instrument; check against the data sheet")
+                format!("typical value for {class} instrument; check it against the data sheet")
             }
         };
         let table = format!("imu.prior.{}", sensor.name());
@@ -141,7 +142,7 @@ impl Draft {
         let (zero, off, why) = if is_own {
             (rest, 0.0, "mean output at rest")
         } else {
-            let why = "output of an unsigned register at zero input";
+            let why = "the output of an unsigned register at zero input";
             (Vector3::zeros(), rest.amax(), why)
         };
         remarks.reason(&format!("{table}.bias"), why);

@@ -11,7 +11,7 @@ const CODES: f64 = 65_536.0;
 /// Rows of both triads minus the nominal register zero.
 pub struct RawSamples {
     pub triads: PerSensor<Vec<Vector3<f64>>>,
-    /// Indices of rows that follow a gap.
+    /// Indices of the rows that follow a gap.
     pub breaks: Vec<usize>,
     /// Sample period, s.
     pub period: f64,
@@ -57,7 +57,7 @@ impl RawSamples {
         Motion::find(&triads, &self.breaks, self.period)
     }
 
-    /// The axis with mostly negative specific force in the first rows.
+    /// The axis whose specific force is mostly negative in the first rows.
     pub fn points_down(&self) -> Option<usize> {
         let accel = &self.triads.accel;
         let rows = ((WINDOW / self.period).round() as usize).clamp(1, accel.len().max(1));
@@ -79,7 +79,7 @@ impl RawSamples {
     }
 }
 
-/// Half the range of a register of whole numbers with its zero in the middle, if all values are around this middle.
+/// Half the range of an integer register whose zero is in the middle of the range, if all values are near this middle.
 pub fn offset(samples: &[Vector3<f64>]) -> Option<f64> {
     let values = || samples.iter().flat_map(|sample| sample.iter().copied());
     if values().any(|value| value.fract() != 0.0) {

@@ -22,7 +22,7 @@ use turncal_logs::{DataFile, Source, streams};
 pub struct Streams {
     /// Content of the log, one line per stream.
     listed: Vec<String>,
-    /// The gyro stream, and the accelerometer stream if separate.
+    /// The gyro stream, and the accelerometer stream if it is a separate one.
     pub gyro: String,
     pub accel: Option<String>,
     /// Time columns and units, if there are two streams.
@@ -34,7 +34,7 @@ pub struct Streams {
     pub axes: Option<&'static str>,
     /// The first damage.
     pub damage: Option<FileError>,
-    /// The accelerometer file, if both triads are rows of text.
+    /// The accelerometer file, if both triads are in text files.
     pub written: Option<Written>,
 }
 
@@ -120,8 +120,8 @@ impl Streams {
         Ok(Some((streams, sheet)))
     }
 
-    /// Examines the files of both triads, as written by phones and `ulog2csv`, or one file with separate rows; a
-    /// separate accelerometer file has this name in the draft.
+    /// Examines the files of both triads, as written by phones and `ulog2csv`, or one file with separate rows; `name`
+    /// is the name of a separate accelerometer file in the draft.
     pub fn of_two_files(
         gyro: &DataFile,
         accel: &DataFile,
@@ -194,7 +194,7 @@ impl Streams {
         }
     }
 
-    /// States the selected streams in `[imu]`, after the content of the log.
+    /// Writes the selected streams into `[imu]`, below a description of the log's content.
     pub fn describe(&self, imu: &mut ImuFile, remarks: &mut Remarks) {
         if self.written.is_none() {
             for line in &self.listed {
@@ -228,7 +228,7 @@ impl Streams {
         if let Some(damage) = self.damage.as_ref().filter(|_| self.written.is_none()) {
             let damage = one_line(&damage.to_string());
             imu.salvage = Some(true);
-            let why = format_args!("uncomment to use the intact part. {damage}");
+            let why = format_args!("uncomment this line to use the intact part. {damage}");
             remarks.open("imu.salvage", why);
         }
     }

@@ -45,9 +45,9 @@ impl Draft {
         };
         let of_table = match &self.columns.quaternion {
             Some(four) => format!(
-                "{} form a quaternion. If it comes from a turntable (body right-front-up to East-North-Up, order w, \
-                 x, y, z), add a [turntable] that reads this file. Do not use an attitude computed by the instrument \
-                 itself.",
+                "{} form a quaternion. If it comes from a turntable (body right-front-up to East-North-Up, order w, x, \
+                 y, z), add a [turntable] that reads this file. Do not use this attitude if the instrument itself \
+                 computed it.",
                 self.list(four)
             ),
             None => "If you have a turntable log, add [turntable] with file, columns, position_sigma_arcsec and \
@@ -107,7 +107,8 @@ impl Draft {
             streams.describe(&mut imu, remarks);
         }
         remarks.reason("imu.output", &found.output_why);
-        let why = "1σ of the rate, which no time stamps confirm; it is part of the σ of the gyro scale factors";
+        let why = "1σ of the sample rate, which no time stamps confirm; it is included in the σ of the gyro scale \
+                   factors";
         remarks.reason("imu.sample_period_sigma_ppm", why);
         if found.opposed {
             remarks.before(
@@ -147,7 +148,7 @@ impl Draft {
         let (path, clock) = ("imu.sample_period_s", &self.clock);
         let Some(period) = clock.period else {
             if !self.rows_show_period() {
-                let why = "seconds between rows; a counter does not give them";
+                let why = "seconds between rows, which a counter does not show";
                 remarks.open(path, why);
             }
             return None;
@@ -180,7 +181,8 @@ impl Draft {
             }
             (0, gaps, _) => format!("rows are missing in {}", places(gaps)),
             (cuts, ..) => format!(
-                "gravity direction jumps in {}, as in concatenated sections; otherwise set true",
+                "the gravity direction jumps in {}, as between concatenated sections; if the log is continuous, set \
+                 true",
                 places(cuts)
             ),
         }
@@ -202,7 +204,7 @@ impl Draft {
             remarks.reason(path, AXES_OF_PROGRAM);
             return axes;
         }
-        let mut why = "guess: x right, y front, z up; otherwise \"frd\" or \"flu\"".to_owned();
+        let mut why = "guess: x right, y front, z up; otherwise set \"frd\" or \"flu\"".to_owned();
         if is_of_autopilot(&self.columns.names) {
             why += "; the column names are those of PX4 or ArduPilot, which use \"frd\"";
         }
@@ -245,8 +247,8 @@ impl Draft {
                 (None, None) => remarks.open_before(path, why()),
                 (None, Some(_)) => {
                     let without = sensor.pick(
-                        "without them only the accelerometers can be calibrated",
-                        "without them only `turncal allan` can use the log",
+                        "without these columns, only the accelerometers can be calibrated",
+                        "without these columns, only `turncal allan` can use the log",
                     );
                     remarks.before(path, format_args!("{}; {without}", why()));
                 }
@@ -291,7 +293,7 @@ impl Draft {
         }
     }
 
-    /// Why the triads that were identified by value are a guess, and what to check.
+    /// Why triads identified by their values are only a guess, and what to check.
     pub fn doubt_words(&self, doubt: &Doubt) -> String {
         match doubt {
             Doubt::Order(order) => {
@@ -301,7 +303,7 @@ impl Draft {
                 let order: Vec<String> = order.iter().map(signed).collect();
                 let gyro = toml::Value::from(order);
                 format!(
-                    "gravity turns as with gyro = {gyro}; check the order of the axes in the logger"
+                    "the change of gravity fits gyro = {gyro}; check the order of the axes in the logger"
                 )
             }
             Doubt::Rival(rival) => {
@@ -311,7 +313,8 @@ impl Draft {
                 )
             }
             Doubt::NoTurns => {
-                "no turn of gravity compares the columns; check them in the logger, or record turns"
+                "the log contains no turns by which the columns could be compared; check the columns in the logger, or \
+                 record turns"
                     .to_owned()
             }
         }
@@ -321,7 +324,7 @@ impl Draft {
     fn without_time(&self, remarks: &mut Remarks) {
         let (path, why) = ("imu.columns", &self.clock.why);
         let instead = if self.clock.is_stated {
-            "turncal takes the rows as consecutive."
+            "turncal assumes that the rows are consecutive."
         } else if self.rows_show_period() {
             "the sample period is estimated from the turns unless sample_period_s is set."
         } else {
@@ -375,7 +378,7 @@ impl Draft {
         priors
     }
 
-    /// White noise of a triad, stated or at rest, (rad/s)√s or (m/s²)√s.
+    /// White noise of a triad, as stated or as measured at rest, in (rad/s)√s or (m/s²)√s.
     pub fn white_noise(&self, sensor: Sensor) -> Option<f64> {
         if let Some(noise) = &self.stated.noise {
             return Some(noise.get(sensor).random_walk);

@@ -13,7 +13,7 @@ use turncal_logs::clock::Uniform;
 
 /// Plausible sample periods, s (5 kHz to 5 Hz): units that differ by 1000 cannot both be plausible.
 pub const PERIODS: std::ops::Range<f64> = 2e-4..0.2;
-/// Steps within this factor match a stated rate.
+/// Time steps match a stated rate if they agree within this factor.
 pub const STATED: f64 = 1.2;
 
 /// Certainty of a field.
@@ -28,7 +28,7 @@ pub enum Certainty {
 }
 
 impl Certainty {
-    /// The certainty in one word.
+    /// The degree of certainty in one word.
     pub fn word(self) -> &'static str {
         match self {
             Self::Certain => "certain",
@@ -50,15 +50,15 @@ pub struct Clock {
     pub period: Option<f64>,
     /// Whether the period is stated in the file rather than derived from times.
     pub is_stated: bool,
-    /// Steps longer than the usual one.
+    /// Number of time steps longer than the usual one.
     pub gaps: Vec<Gap>,
-    /// Steps that do not increase.
+    /// Number of steps at which the time does not increase.
     pub repeated: usize,
     /// Mean step of the time column, in its unit.
     pub step: Option<f64>,
-    /// Relative 1σ of the period, if it is not that of time stamps.
+    /// Relative 1σ of the period, if time stamps do not determine the period.
     pub sigma: f64,
-    /// Reason to doubt it.
+    /// Reason to doubt the clock.
     pub doubt: Option<String>,
 }
 
@@ -67,13 +67,16 @@ impl Clock {
     pub fn find(sheet: &Sheet, columns: &mut Columns) -> Self {
         let stated = sheet.rate.map(f64::recip);
         let Some((column, stamps)) = columns.time.zip(columns.stamps(sheet)) else {
-            return Self::without(stated, "no column rises steadily, as times do");
+            return Self::without(stated, "no column increases steadily, as times do");
         };
         let steps = Steps::of(&stamps);
         let name = Name::of_column(&sheet.names[column], &sheet.units[column]);
         if name.is_counter() && name.is_time() < 2 && !steps.is_count {
             columns.time = None;
-            return Self::without(stated, "a counter shared with other packets is not a time");
+            return Self::without(
+                stated,
+                "a counter shared with other packets cannot serve as a time",
+            );
         }
         let second = |word: &str| units_of_time().find(|of| of.0 == word);
         let named = (name.unit).and_then(|unit| Some(unit.times * second(unit.word)?.1));
@@ -129,7 +132,7 @@ impl Clock {
         }
     }
 
-    /// A clock whose rate is off by this much more than its σ, if it is not that of time stamps or has a rival.
+    /// A clock whose rate is uncertain by this much, if no time stamps determine the rate or another rate is possible.
     pub fn within(self, off: f64, has_rival: bool) -> Self {
         let is_doubted = self.sigma > 0.0 || has_rival;
         let sigma = if is_doubted {
@@ -140,7 +143,8 @@ impl Clock {
         Self { sigma, ..self }
     }
 
-    /// The clock with rows of this period and its relative 1σ instead of its own; with a doubt unless the user states it.
+    /// A copy of the clock with this row period and its relative 1σ. The copy contains a doubt unless the user stated
+    /// the rate.
     pub fn given_up(self, period: f64, sigma: f64, is_doubted: bool) -> Self {
         let [rate, former] =
             [Some(period), self.period].map(|of| of.map(|of| rounded(of.recip(), 4)));
@@ -155,8 +159,9 @@ impl Clock {
             .filter(|_| self.unit != "count")
             .map(|step| rounded(period / step, 7));
         let doubt = format!(
-            "The clock of the log is doubtful: turns fit the unit of the gyros only if a row lasts {times} times as long as \
-             at {former} Hz ({}; {}). turncal used {rate} Hz{}. State --rate, or --gyro-unit if that is wrong.",
+            "The clock of the log is doubtful: turns fit the unit of the gyros only if a row lasts {times} times as \
+             long as at {former} Hz ({}; {}). turncal used {rate} Hz{}. State --rate, or --gyro-unit if the unit is \
+             wrong.",
             self.unit,
             self.why,
             tick.map_or(String::new(), |tick| format!(", a tick of {tick:?} s")),
@@ -180,7 +185,7 @@ impl Clock {
         self.gaps.iter().filter(long).map(first).collect()
     }
 
-    /// Evidence, statement and remedy if the steps of a time contradict a stated rate.
+    /// Evidence, statement and remedy if the steps of a time column contradict a stated rate.
     pub fn contradiction(&self, rate: f64) -> Option<[String; 3]> {
         let found = self.period?.recip();
         let (hertz, unit, why) = (rounded(found, 6), &self.unit, &self.why);

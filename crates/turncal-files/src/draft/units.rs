@@ -28,7 +28,7 @@ pub struct Unit {
     pub why: String,
     /// Whether the unit is confirmed by motion or stated by the user.
     pub is_shown: bool,
-    /// Whether rows that are not whole numbers fit no known unit.
+    /// Whether the rows are not whole numbers and fit no known unit.
     pub is_unfit: bool,
     /// Scale of counts, if determined.
     pub scale: Option<Scale>,
@@ -43,7 +43,7 @@ impl Unit {
     }
 }
 
-/// Quantity of the rows.
+/// Quantity in the rows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Quantities {
     pub output: Output,
@@ -54,12 +54,12 @@ pub struct Quantities {
 }
 
 impl Quantities {
-    /// The quantities if there are too few numeric rows.
+    /// The quantities to assume if there are too few numeric rows.
     pub fn unknown() -> Self {
         Self {
             output: Output::Rate,
             output_why: "as in most logs".to_owned(),
-            units: PerSensor::from_fn(|_| Unit::open("too few numeric rows to tell")),
+            units: PerSensor::from_fn(|_| Unit::open("there are too few numeric rows to decide")),
             opposed: false,
         }
     }
@@ -145,15 +145,16 @@ impl Quantities {
         self.output = output;
         self.output_why = match output {
             Output::Pulse => {
-                "integer counts whose remainder is carried into the next row, as in pulse outputs"
+                "the values are integer counts, and the remainder of each is carried into the next row, as in pulse \
+                 outputs"
                     .into()
             }
             Output::Increment => {
                 let period = rounded(rows.period, 4);
-                format!("specific force at rest is g times {period} s per row")
+                format!("the specific force at rest is g times {period} s per row")
             }
             Output::Rate => {
-                "specific force at rest is g itself, not g times the sample period".into()
+                "the specific force at rest is g itself, not g times the sample period".into()
             }
         };
     }
@@ -214,9 +215,9 @@ impl Quantities {
             }
             None if is_bare && self.output != Output::Pulse => {
                 return Unit::open(if rows.motion.is_turned {
-                    "too few usable turns of gravity to estimate it"
+                    "there are too few usable turns to estimate it"
                 } else {
-                    "gravity direction does not change, so it cannot be estimated"
+                    "the gravity direction does not change, so it cannot be estimated"
                 });
             }
             _ => {}
@@ -303,7 +304,8 @@ impl Quantities {
         self.units.get(sensor).word == Some("count")
     }
 
-    /// The period for which turns fit the unit of the gyros, stated, in the file or found; for rates.
+    /// For rates: the sample period for which the turns fit the unit of the gyros, whether this unit is stated, named
+    /// in the file or detected.
     pub fn turned_period(
         &self,
         stated: &Stated,
@@ -320,7 +322,7 @@ impl Quantities {
         Some(angle.abs() * per_si)
     }
 
-    /// Factor that converts rows to rates.
+    /// Factor that converts row values to rates.
     pub fn per_second(&self, period: f64) -> f64 {
         match self.output {
             Output::Rate => 1.0,

@@ -1,4 +1,4 @@
-//! Calibrations as other programs apply them: one matrix and one offset per triad, and the residual errors.
+//! Calibrations in the form that other programs apply: one matrix and one offset per triad, and the residual errors.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -60,7 +60,7 @@ impl Residual {
         Sensor::ALL.into_iter().map(of).filter(exceeds).collect()
     }
 
-    /// Size of the residual error, as a sentence.
+    /// A sentence that states the size of the residual error.
     pub fn words(&self) -> String {
         let scale = self.errors.diagonal().amax();
         let mut across = self.errors;

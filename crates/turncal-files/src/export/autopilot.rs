@@ -6,8 +6,8 @@
 //! Source: PX4-Autopilot, `src/lib/sensor_calibration` and `src/modules/temperature_compensation`; ArduPilot,
 //! `AP_InertialSensor_Backend.cpp`, `_rotate_and_correct_accel`, and `AP_InertialSensor_tempcal.cpp`, `correct_sensor`;
 //! Betaflight, `acceleration.c`, `applyAccelerationTrims`; INAV, `acceleration.c`, `applyAccelerationZero`, and
-//! `gyro.c`, `gyro_zero_x`. PX4 skips thermal parameters whose `TC_G0_ID`, `TC_A0_ID` is not the device's:
-//! `TemperatureCompensation::set_sensor_id`.
+//! `gyro.c`, `gyro_zero_x`. PX4 skips thermal parameters whose `TC_G0_ID` or `TC_A0_ID` is not the identity of the
+//! device: `TemperatureCompensation::set_sensor_id`.
 
 use nalgebra::Vector3;
 
@@ -60,7 +60,7 @@ fn px4_lines(parameters: Parameters) -> String {
     parameters.into_iter().map(line).collect()
 }
 
-/// PX4's temperature: `n − (X0 + X1 d + X2 d² + X3 d³)`, d = T − TREF, before `CAL_*` are applied.
+/// Temperature correction of PX4: `n − (X0 + X1 d + X2 d² + X3 d³)`, d = T − TREF, before `CAL_*` are applied.
 pub fn px4(values: &Values) -> Exported {
     let program = single(values);
     let names = ["CAL_GYRO0_#OFF", "CAL_ACC0_#OFF", "CAL_ACC0_#SCALE"];
@@ -97,8 +97,8 @@ pub fn px4(values: &Values) -> Exported {
     Remarks::of_program(values, reads, &program, &[UNCORRECTED, &ids]).above(&text)
 }
 
-/// ArduPilot's temperature: `n − p(T) + p(T_cal)` before the offsets are subtracted, with `p(T) = (c₁ d + c₂ d² + c₃
-/// d³) 10⁻⁶`, d = T − 35 °C.
+/// Temperature correction of ArduPilot: `n − p(T) + p(T_cal)` before the offsets are subtracted, with `p(T) = (c₁ d +
+/// c₂ d² + c₃ d³) 10⁻⁶`, d = T − 35 °C.
 pub fn ardupilot(values: &Values) -> Exported {
     let program = single(values);
     let notes = [
@@ -156,19 +156,20 @@ pub fn betaflight(values: &Values) -> Exported {
         gyro: Affine::offset(Vector3::zeros()),
         accel: Affine::offset(zero / per_unit),
     };
-    let notes = ["all gyro parameters, because it zeroes the gyros at every start"];
+    let notes = ["all gyro parameters, because Betaflight zeroes the gyros at every start"];
     let reads = ("#", "commands for its command line, from rad/s and m/s^2");
     let [x, y, z] = [zero.x, zero.y, zero.z].map(|count| count as i64);
     Remarks::of_program(values, reads, &program, &notes)
         .defines([
             of_counts("an accelerometer", COUNTS_PER_G, "g"),
-            "for a log recorded with acc_calibration = 0,0,0,0: Betaflight subtracts it before it logs".to_owned(),
+            "for a log recorded with acc_calibration = 0,0,0,0, because Betaflight subtracts this value before \
+             logging".to_owned(),
         ])
         .above(&format!("set acc_calibration = {x},{y},{z},1\nsave\n"))
 }
 
-/// INAV computes `(counts − acczero) accgain / 4096` for accelerometers; gyro zeros are used if it does not estimate
-/// them.
+/// INAV computes `(counts − acczero) accgain / 4096` for accelerometers; INAV uses the gyro zeros unless it estimates
+/// them itself.
 pub fn inav(values: &Values) -> Exported {
     let PerSensor { gyro, accel } = &values.triads;
     let per_unit = COUNTS_PER_G / STANDARD_GRAVITY;
@@ -195,7 +196,7 @@ pub fn inav(values: &Values) -> Exported {
             of_counts("an accelerometer", COUNTS_PER_G, "g"),
             of_counts("gyros", COUNTS_PER_RAD_S, "rad/s"),
             "for a log recorded with acczero and gyro_zero = 0, accgain = 4096 and init_gyro_cal = OFF: INAV applies \
-             them before it logs"
+             these values before logging"
                 .to_owned(),
         ])
         .above(&(text + "set init_gyro_cal = OFF\nsave\n"))

@@ -1,7 +1,7 @@
 //! IMU section of a KF-GINS configuration.
 //!
-//! Along front, right, down, from true to measured: `n = (1 + s) u + b` axis by axis, with b in °/h and mGal, s in ppm.
-//! KF-GINS corrects by `u = (n − b) / (1 + s)`.
+//! The model from true to measured values, along front, right and down, is `n = (1 + s) u + b` axis by axis, with b in
+//! °/h and mGal, s in ppm. KF-GINS corrects by `u = (n − b) / (1 + s)`.
 //!
 //! Source: the KF-GINS configuration file and its IMU compensation (GIEngine, i2Nav, Wuhan University).
 
@@ -32,7 +32,8 @@ pub fn write(values: &Values) -> Exported {
              too much, give KF-GINS the output of `turncal apply` with zero bias and scale"
         ),
         "sigma of misalignment, and covariance; they are in calibration.json",
-        "gsstd and asstd of imunoise, which KF-GINS requires: variation of scale factors in ppm, from the data sheet",
+        "gsstd and asstd of imunoise, which KF-GINS requires: the variation of the scale factors in ppm, from the data \
+         sheet",
     ];
     let PerSensor { gyro, accel } = &values.triads;
     let error = |triad: &Normalised| triad.sensitivity.diagonal().add_scalar(-1.0);
@@ -94,7 +95,7 @@ fn noise(values: &Values, missing: &mut Vec<String>) -> String {
     };
     let line = |name: &str, value: f64, unit: f64, unit_name: &str, is_usual: bool| {
         let usual = if is_usual {
-            ", usual for this white noise"
+            ", the usual value for this white noise"
         } else {
             ""
         };

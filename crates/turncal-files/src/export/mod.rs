@@ -30,9 +30,9 @@ use values::Values;
 pub struct Format {
     /// Name on the command line.
     pub name: &'static str,
-    /// Extension of its files.
+    /// Extension of the files in this format.
     pub extension: &'static str,
-    /// Programs that read it.
+    /// Programs that read this format.
     pub about: &'static str,
     axes: Axes,
     write: fn(&Values) -> Exported,
@@ -59,7 +59,8 @@ const fn row(
 
 /// Temperature dependence that autopilots cannot represent.
 const IN_AUTOPILOTS: &str = "change of scale factors and misalignments with temperature, change of biases with \
-    temperature rate, and orders above three; biases refer to the temperature of the sensor";
+                             temperature rate, and orders above three; the biases refer to the temperature of the \
+                             sensor";
 
 /// Every format.
 #[rustfmt::skip]
@@ -101,7 +102,7 @@ impl Format {
 /// scales by which counts are divided, for formats in rad/s and m/s².
 ///
 /// # Errors
-/// If the calibration has no inverse or an unknown term, or does not belong to the instrument of the run.
+/// If the calibration has no inverse, contains an unknown term, or does not belong to the instrument of the run.
 pub fn write(
     record: &Calibration,
     format: &Format,

@@ -7,7 +7,7 @@ use turncal::calibration::result::{Calibration, EQUATION, Method};
 use turncal::imu::{AxisOrder, PerSensor, Sensor, Term};
 use turncal::run::Aiding;
 
-/// Omission of nearly every format.
+/// A part of the calibration that nearly every format omits.
 pub const SIGMA: &str = "sigma and covariance of the parameters; they are in calibration.json";
 
 /// A calibration in a format.
@@ -56,13 +56,13 @@ impl<'a> Remarks<'a> {
         remarks
     }
 
-    /// A copy that does not mention these error terms.
+    /// Returns a copy that does not mention these error terms.
     pub fn including(mut self, is_included: fn(Term) -> bool) -> Self {
         self.is_included = is_included;
         self
     }
 
-    /// Adds the axes of the values, their direction or reader, and the divisor of raw output.
+    /// Adds the axes of the values, their direction or the reading program, and the divisor of the raw output.
     pub fn reads(self, what: &str) -> Self {
         let axes = match self.values.order {
             AxisOrder::IDENTITY => "right, front, up",
@@ -102,7 +102,7 @@ impl<'a> Remarks<'a> {
         self.omissions.iter().cloned().chain(note).collect()
     }
 
-    /// All lines as comments.
+    /// Returns all lines as comments.
     pub fn text(&self) -> String {
         let omitted = self.omitted().join("; ");
         let omitted = (!omitted.is_empty()).then(|| format!("not included: {omitted}"));
@@ -149,7 +149,7 @@ pub fn title(record: &Calibration) -> String {
     parts.join("; ")
 }
 
-/// Definitions of `N` and `u`, for formats whose values are those of the record.
+/// Definitions of `N` and `u`, for formats that contain the values of the record unchanged.
 pub fn equation(values: &Values) -> [String; 2] {
     let record = values.record;
     let axes = match &record.columns {

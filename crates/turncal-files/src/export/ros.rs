@@ -9,7 +9,7 @@ use super::remarks::{Exported, Remarks};
 use super::values::Values;
 use turncal::imu::{PerSensor, Sensor};
 
-/// Row-major about x, y, z: variance per sample, density² × rate.
+/// Covariance matrices about x, y, z in row-major order, with the variance per sample, density² × rate.
 pub fn covariance(values: &Values) -> Exported {
     let notes = [
         "scale, misalignment and bias; publish the output of `turncal apply`, which has these errors removed",
@@ -34,7 +34,7 @@ pub fn covariance(values: &Values) -> Exported {
         .above(&lines.map(line).concat())
 }
 
-/// `SM n − bias` for the accelerometers, so the bias is in corrected units.
+/// The program computes `SM n − bias` for the accelerometers, so the bias is in corrected units.
 pub fn imu_calib(values: &Values) -> Exported {
     let program = PerSensor {
         gyro: Affine::offset(values.triads.gyro.bias),

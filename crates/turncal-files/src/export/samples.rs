@@ -32,15 +32,15 @@ pub struct Samples<'a> {
     pub correction: &'a Correction,
     /// Whether missing samples are also written, interpolated, with 1 in a column `filled`.
     pub fill: bool,
-    /// Verdict of the calibration, used as the name of a last column.
+    /// Verdict of the calibration, used as the name of the last column.
     pub verdict: Option<Word>,
 }
 
 impl Samples<'_> {
     /// Writes one row per log row, with [`HEADER`] first; for a temperature-dependent calibration, `in_range` states
-    /// whether it is valid at the temperature of the row. A row contains means over its sample, so the output is a log
-    /// with `output = "rate"` in `rad/s` and `m/s^2`. Numbers have the fewest digits that are read back as the same
-    /// value.
+    /// whether the calibration is valid at the temperature of the row. Each row contains the means over its sample, so
+    /// the output is itself a log with `output = "rate"` in `rad/s` and `m/s^2`. Numbers are written with the fewest
+    /// digits that reproduce the same value when read.
     pub fn rows(&self, file: &mut dyn Write) -> io::Result<()> {
         let optional = |is_there: bool, column| if is_there { column } else { "" };
         let in_range = optional(self.correction.changes(), ",in_range");

@@ -9,7 +9,7 @@ use turncal::calibration::{Correction, CorrectionError, Source};
 use turncal::imu::{AXES, AxisOrder, GaussMarkov, Noise, PerSensor, Sensor, Term};
 use turncal::run::Run;
 
-/// Polynomial orders in temperature supported by autopilots.
+/// Orders of the temperature polynomials that autopilots support.
 pub const ORDERS: usize = 3;
 
 /// Axes of the values of a format.
@@ -21,7 +21,7 @@ pub enum Axes {
     Log,
 }
 
-/// Every value of a calibration and, perhaps, a run of its instrument.
+/// Every value of a calibration and, optionally, a run of its instrument.
 pub struct Values<'a> {
     pub record: &'a Calibration,
     /// Correction in the unit of the record, along right, front, up.
@@ -38,7 +38,7 @@ pub struct Values<'a> {
 
 /// A triad in rad/s or m/s²: `n = sensitivity u + bias`, `u = inverse (n − bias)`, with `n = N / nominal`.
 pub struct Normalised {
-    /// Divisor of the quantity of the file per second, axis by axis.
+    /// Divisor of the file's quantity per second, axis by axis.
     pub nominal: Vector3<f64>,
     pub sensitivity: Matrix3<f64>,
     pub inverse: Matrix3<f64>,
@@ -49,13 +49,13 @@ pub struct Normalised {
     pub bias_sigma: Option<Vector3<f64>>,
     /// Coefficients of powers 1 to 3 of the bias about the reference temperature, axis by axis, in n per °C, °C², °C³.
     pub bias_powers: [[f64; ORDERS]; 3],
-    /// Noise with white noise above zero, if it is known.
+    /// Noise of the instrument, if it is known and its white noise is above zero.
     pub noise: Option<Noise>,
 }
 
 impl<'a> Values<'a> {
-    /// The values for a format. Without a run, the unit gives the nominal scale; for counts, the calibrated scale
-    /// factors, rounded to three digits.
+    /// The values for a format. Without a run, the unit gives the nominal scale; for counts, the nominal scale is the
+    /// calibrated scale factors rounded to three digits.
     pub fn new(
         record: &'a Calibration,
         run: Option<&Run>,
@@ -90,8 +90,8 @@ impl<'a> Values<'a> {
         })
     }
 
-    /// The unit of `N`. A count may be one of a rate or, per second, one of an increment; the record does not
-    /// distinguish the two.
+    /// The unit of `N`. A count may be a unit of rate or, per second, a unit of increment; the record does not
+    /// distinguish the two cases.
     pub fn unit(&self, sensor: Sensor) -> String {
         let unit = self.record.unit.as_ref();
         match unit.map(|unit| unit.get(sensor).as_str()) {
@@ -111,12 +111,12 @@ impl<'a> Values<'a> {
         Some(self.record.sigma.as_ref()?.get(sensor))
     }
 
-    /// Omission of these keys; `None` if there are none.
+    /// Remark on the omission of these keys; `None` if no key is omitted.
     pub fn missing(keys: &[String], program: &str) -> Option<String> {
         let keys = (!keys.is_empty()).then(|| keys.join(", "))?;
         Some(format!(
-            "{keys}: {program} does not start without them; export with --run RUN.toml, or measure them with \
-             `turncal allan`"
+            "{keys}: {program} does not start without these keys; export with --run RUN.toml, or measure the noise \
+             with `turncal allan`"
         ))
     }
 }
@@ -172,7 +172,7 @@ impl Normalised {
         Some(self.noise?.random_walk)
     }
 
-    /// Bias variation, and whether it is only the usual variation for this white noise.
+    /// Bias variation, and whether this value is only the usual one for this white noise.
     pub fn varying(&self) -> Option<(GaussMarkov, bool)> {
         let noise = self.noise?;
         let usual = || (usual_variation(&noise), true);

@@ -1,4 +1,4 @@
-//! Samples of rows, in parts: a short log at once, a long one packed part by part.
+//! Conversion of rows to samples: a short log at once, a long log packed part by part.
 
 use std::ops::Range;
 
@@ -42,7 +42,8 @@ pub struct Parts<'a> {
 }
 
 impl<'a> Parts<'a> {
-    /// Starts with the first rows of a log, or all of them. For a log in parts, the drift of the samples may be known.
+    /// Starts with the first rows of a log, or with all of them. For a log in parts, the drift of the samples may be
+    /// known.
     pub fn new(
         log: &'a ImuLog<'a>,
         layout: Layout,
@@ -91,7 +92,7 @@ impl<'a> Parts<'a> {
         self.size.map(|size| self.taken + size + 2 * BESIDE)
     }
 
-    /// Whether enough rows are in memory to process some.
+    /// Whether enough rows are in memory for some of them to be processed.
     pub fn is_full(&self, held: &Held) -> bool {
         self.end().is_some_and(|end| held.len() >= end + REACH)
     }
@@ -273,7 +274,8 @@ impl<'a> Parts<'a> {
         self.next - self.rows
     }
 
-    /// The samples of the complete log; `integral_error` is that of its accelerometers, in their quantity times s.
+    /// The samples of the complete log; `integral_error` is the error of the integrals of the accelerometers, in their
+    /// quantity times s.
     pub fn finish(
         mut self,
         clock: Uniform,

@@ -178,7 +178,7 @@ impl<'a> Reading<'a> {
 }
 
 impl ImuLog<'_> {
-    /// Reads the samples, finds and bridges faults; `notes` receives remarks about the file.
+    /// Reads the samples, then finds and bridges faults; `notes` receives remarks about the file.
     pub fn read(&self, notes: &mut Vec<String>) -> Result<ImuSamples, FileError> {
         self.read_by(Sizes::default(), notes)
     }

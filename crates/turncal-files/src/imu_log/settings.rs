@@ -1,4 +1,4 @@
-//! Settings of the instrument's log in `run.toml`, and its columns.
+//! Settings for the instrument's log in `run.toml`, and the columns of this log.
 
 use nalgebra::Vector3;
 
@@ -17,7 +17,7 @@ use turncal_logs::rows::LogRows;
 pub struct ImuLog<'a> {
     pub source: Source<'a>,
     pub clock: Clock<'a>,
-    /// Source of the accelerometers, if not in the gyro rows.
+    /// Source of the accelerometers, if they are not in the gyro rows.
     pub accel_from: Option<(Source<'a>, Clock<'a>)>,
     /// Column and number of the selected instrument, if the log has several.
     pub instance: Option<(&'a str, f64)>,
@@ -41,7 +41,7 @@ pub struct Layout {
     pub names: [FileColumn; 6],
     /// `None` for a missing triad.
     pub places: [Option<usize>; 6],
-    /// Body axis of each (right, front or up).
+    /// Body axis of each column (right, front or up).
     pub body_axes: [usize; 6],
 }
 
@@ -51,7 +51,7 @@ pub fn sensor(column: usize) -> Sensor {
 }
 
 impl Layout {
-    /// Rad and m/s per unit of each column in a row, from nominal scales.
+    /// The angle in rad or velocity in m/s that one unit of each column in a row represents, from nominal scales.
     pub fn units(&self, log: &ImuLog, period: f64) -> [f64; 6] {
         let unit = |k: usize| log.seconds(period) / log.nominal.get(sensor(k)).0[self.body_axes[k]];
         std::array::from_fn(unit)
@@ -68,7 +68,7 @@ impl Layout {
         [0, 1, 2].map(|axis| along(axis).unwrap_or(first + axis))
     }
 
-    /// One rad and m/s along right, front and up, in the unit of the corresponding column.
+    /// One rad or one m/s along right, front and up, in the unit of the corresponding column.
     pub fn body_nominal(&self, log: &ImuLog, sensor: Sensor) -> Vector3<f64> {
         let columns = self.columns(sensor);
         Vector3::from_fn(|axis, _| {

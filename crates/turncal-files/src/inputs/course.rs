@@ -15,7 +15,7 @@ const SAME: f64 = 1e-6;
 /// Samples without a gap, with integrals in values times samples.
 #[derive(Default)]
 pub struct Course {
-    /// Start of the samples, in samples.
+    /// Start of these samples, in samples.
     pub begin: f64,
     pub sums: [Vec<f64>; 3],
 }
@@ -66,9 +66,10 @@ impl Course {
     /// Mean square error of the integral midway between two edges.
     ///
     /// Every second edge is omitted and interpolated from its neighbours, and every fourth edge from those two edges
-    /// away. The squared error due to white noise (modelled by the filter) grows linearly with the edge distance; that
-    /// of a signal not followed by the cubic grows with its eighth power. The two parts can therefore be separated; the
-    /// signal part at the actual distance is 2⁻⁸ of that at twice the distance.
+    /// away. The squared error due to white noise (modelled by the filter) grows linearly with the edge distance; the
+    /// squared error of a signal that the cubic does not follow grows with the eighth power of the distance. The two
+    /// parts can therefore be separated; the signal part at the actual distance is 2⁻⁸ of the signal part at twice the
+    /// distance.
     pub fn edge_error(&self) -> [f64; 3] {
         self.sums.each_ref().map(|sums| {
             let missed = |apart: usize| {
@@ -180,13 +181,13 @@ pub struct Even {
     resampled: Resampled,
 }
 
-/// Edges of drifting samples relative to uniform samples; the uniform samples start with the first whole one. Stamps
-/// are `lag` samples after the start of a sample.
+/// Edges of drifting samples relative to uniform samples; the uniform samples start with the first whole one. Time
+/// stamps are `lag` samples after the start of a sample.
 pub fn place(wander: &Wander, lag: f64, edge: usize) -> f64 {
     wander.time(edge as f64 - lag) + lag
 }
 
-/// Number of uniform samples that these cover, from the first.
+/// Number of uniform samples that these drifting samples cover, from the first.
 pub fn reached(wander: &Wander, lag: f64, samples: &Range<usize>) -> Range<usize> {
     let first = place(wander, lag, 0).ceil();
     let of = |edge| place(wander, lag, edge) - first;

@@ -67,7 +67,7 @@ impl<'a> Fields<'a> {
         })
     }
 
-    /// Source of the accelerometers, if not in the gyro rows, and their clock.
+    /// Source of the accelerometers and their clock, if they are not in the gyro rows.
     pub fn accel_from(
         &self,
         gyro: &Source<'a>,

@@ -116,7 +116,7 @@ impl<'a> Fields<'a> {
         let axes = letters.iter().map(|letter| Some(axis(letter)?.1));
         let Some(axes) = axes.collect() else {
             let expected = "`x`, `y` or `z` for each axis";
-            let advice = "Name the axis about which the table turns when all angles are zero.";
+            let advice = "For each angle, name the axis about which it turns the table when all angles are zero.";
             return Err(self.document.wrong(path, expected, advice));
         };
         let quaternion = columns.quaternion.iter().flat_map(|names| &names.0);

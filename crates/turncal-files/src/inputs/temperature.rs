@@ -19,7 +19,7 @@ pub struct TemperatureColumns<'a> {
 }
 
 impl<'a> TemperatureColumns<'a> {
-    /// One column for both triads, or one or three for each.
+    /// One column for both triads, or one or three columns for each triad.
     pub fn of_fields(column: &'a TemperatureColumn, unit: TemperatureUnit) -> Self {
         let mut all = Self {
             names: Vec::new(),
@@ -50,7 +50,7 @@ impl<'a> TemperatureColumns<'a> {
         })
     }
 
-    /// The columns, each once.
+    /// The columns without repetitions.
     pub fn names(&self) -> &[&'a str] {
         &self.names
     }
@@ -110,7 +110,7 @@ pub struct Read {
 }
 
 impl Temperatures {
-    /// Processes a row with this stamp, s.
+    /// Processes a row with this time stamp, s.
     pub fn take(&mut self, csv: &LogRows, time: f64) {
         let first = *self.first.get_or_insert(time);
         let span = (time - first) / TEMPERATURE_SPACING;
@@ -122,7 +122,7 @@ impl Temperatures {
         }
     }
 
-    /// The result, for stamps delayed by this time relative to the start of the first sample, s.
+    /// The temperatures, if the stamps are delayed by this time relative to the start of the first sample, s.
     pub fn read(self, file: &str) -> Read {
         let facts = self.channels.first().and_then(|channel| {
             let count: f64 = channel.spans.iter().map(|of| f64::from(of.1)).sum();

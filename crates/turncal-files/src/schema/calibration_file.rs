@@ -1,4 +1,4 @@
-//! `calibration.json` and `truth.json`: validated on reading, and on writing by the same checks.
+//! `calibration.json` and `truth.json`, which are validated by the same checks on reading and on writing.
 //!
 //! A failed calibration is written with values of any size, because its findings state that they must not be used.
 
@@ -65,7 +65,7 @@ fn record_of(bytes: &[u8], path: &Path) -> Result<Calibration, FileError> {
     Ok(record)
 }
 
-/// The record as file bytes that [`read_calibration`] accepts; `path` is used in error messages.
+/// The record as the bytes of a file that [`read_calibration`] accepts; `path` is used in error messages.
 pub fn calibration_json(record: &Calibration, path: &Path) -> Result<Vec<u8>, FileError> {
     let expected = "values that JSON can represent".to_owned();
     let written = || small_file::pretty(record).map_err(|error| (error.to_string(), expected));
@@ -75,7 +75,7 @@ pub fn calibration_json(record: &Calibration, path: &Path) -> Result<Vec<u8>, Fi
     Ok(bytes)
 }
 
-/// Writes the complete record or nothing; an existing file is replaced only with `force`.
+/// Writes the complete record or nothing at all; an existing file is replaced only with `force`.
 pub fn write_calibration(record: &Calibration, path: &Path, force: bool) -> Result<(), FileError> {
     write_whole(path, &calibration_json(record, path)?, force)
 }

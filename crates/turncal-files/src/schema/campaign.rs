@@ -20,9 +20,9 @@ const FORMAT: &str = "turncal-campaign/1";
 /// Recordings of one instrument with their common settings.
 #[derive(Debug, Clone)]
 pub struct Campaign {
-    /// Name of its directory or file.
+    /// Name of the campaign's directory or file.
     pub name: String,
-    /// Recordings in order of name, independent of the order in the file.
+    /// Recordings sorted by name, independent of their order in the file.
     pub runs: Vec<Run>,
     /// Common settings.
     pub together: Together,

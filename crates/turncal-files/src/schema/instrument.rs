@@ -26,9 +26,9 @@ pub const USUAL_BIAS: PerSensor<f64> = PerSensor {
     gyro: 2.0 * DEGREE,
     accel: 1.0,
 };
-/// Assumed sample period until estimated from motion, s.
+/// Sample period assumed until it is estimated from motion, s.
 pub const USUAL_PERIOD: f64 = 0.01;
-/// Relative 1σ of a rate that no time stamps confirm: the tolerance of the oscillators of MEMS.
+/// Relative 1σ of a rate that no time stamps confirm: the tolerance of the oscillators in MEMS sensors.
 pub const RATE_SIGMA: f64 = 0.01;
 /// Maximum relative 1σ of a scale factor.
 const WIDEST_SCALE: f64 = 10.0;
@@ -58,7 +58,7 @@ pub struct InstrumentFields<'a> {
 }
 
 impl<'a> Fields<'a> {
-    /// The fields of a document; the files given in it are in its directory.
+    /// The fields of a document; the files named in the document are in its directory.
     pub fn new(document: Document<'a>, run: &'a RunFile, in_memory: &'a [DataFile]) -> Self {
         Self {
             document,
@@ -247,7 +247,8 @@ impl<'a> Fields<'a> {
         match (of.prior.scale.map(OneOrThree::vector), of_unit) {
             (None, Some(of_unit)) => Ok(Vector3::repeat(of_unit)),
             (None, None) => {
-                let meaning = "the counts per second for 1 rad/s or 1 m/s², because the size of a count varies by instrument";
+                let meaning = "the counts per second for 1 rad/s or 1 m/s², because the size of a count depends on the \
+                               instrument";
                 Err(document.missing(&path, meaning))
             }
             (Some(scale), _) if scale.iter().any(|&s| s == 0.0) => {

@@ -147,7 +147,7 @@ fn check_complete(document: Document, mut open: Vec<String>) -> Result<(), FileE
         count => format!("{count} open fields"),
     };
     let all = open.join(", ");
-    let expected = "text or a value in each (ISO/IEC 17025, 7.8.2 and 7.8.4)";
+    let expected = "a text or value in each field (ISO/IEC 17025, 7.8.2 and 7.8.4)";
     let advice = format_args!("Complete {all}.");
     Err(FileError::of(document.file, fields, expected, advice))
 }

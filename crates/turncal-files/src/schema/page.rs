@@ -1,4 +1,4 @@
-//! TOML text of the structs that read it, with remarks for people.
+//! TOML text generated from the structs that read it, with remarks for readers.
 
 use std::fmt::Display;
 
@@ -65,7 +65,7 @@ impl Remarks {
     }
 }
 
-/// The text of a document of this format with these fields.
+/// The text of a document in this format with these fields.
 pub fn text(format: &str, fields: &impl Serialize, remarks: &Remarks) -> String {
     let text = String::new();
     let mut page = Page { text, remarks };

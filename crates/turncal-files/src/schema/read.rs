@@ -26,9 +26,9 @@ const NOISE_OF_MEANS: f64 = 300.0 * MICRO_G_PER_SQRT_HZ;
 
 /// Reads `run.toml` and the files given in it, relative to itself.
 ///
-/// Everything is checked: known fields, finite and possible numbers, uniform time, overlapping files. Samples,
-/// nominal scales and priors are returned along right-front-up for any `body_axes`. Unstated site, noise, period
-/// and prior get wide defaults, with a note.
+/// Everything is checked: known fields, finite and possible numbers, uniform time, overlapping files. Samples, nominal
+/// scales and priors are returned along right-front-up for any `body_axes`. If the site, noise, period or prior is not
+/// stated, it gets a wide default, with a note.
 pub fn read_run(path: &Path) -> Result<Run, FileError> {
     run_of_text(path, &text_of(path)?, Some(path), &[])
 }
@@ -185,8 +185,9 @@ impl InstrumentFields<'_> {
         }
         if imu.is_of_means() {
             notes.push(format!(
-                "The rows are the means of {} positions, and their noise is not known. turncal assumed {}, that of a \
-                 second of a MEMS sensor. State velocity_random_walk_ug_per_sqrt_hz for rows of one second if you know it.",
+                "The rows are the means of {} positions, and their noise is not known. turncal assumed {}, the noise \
+                 of a MEMS sensor averaged over one second. If you know the noise, state \
+                 velocity_random_walk_ug_per_sqrt_hz for rows of one second.",
                 imu.len(),
                 found.join(", ")
             ));
@@ -211,7 +212,7 @@ impl InstrumentFields<'_> {
         let Some(period) = angle.filter(|&period| period > 0.0) else {
             return Err(FileError::of(
                 &self.log.source.file,
-                "rows without time stamps, and turns that are not good enough to estimate the sample period",
+                "rows without time stamps, and no turns from which the sample period can be estimated",
                 "a time column or sample_period_s in run.toml",
                 "State sample_period_s (--rate).",
             ));

@@ -36,8 +36,9 @@ const ANGLES: [&str; 3] = ["outer", "middle", "inner"];
 
 /// Writes a run into an existing directory: `run.toml`, `imu.csv.gz`, `table.csv.gz`, `segments.csv`, `truth.json`.
 ///
-/// [`crate::read_run`] returns the same run, except for rounding in the last digit, its name (that of the directory) and its
-/// notes. The same run gives the same bytes. `run.instrument.unit` must be a unit of this `output`.
+/// [`crate::read_run`] returns the same run, except for rounding in the last digit, the name (which becomes that of the
+/// directory) and the notes. The same run always gives the same bytes. `run.instrument.unit` must be a unit of this
+/// `output`.
 pub fn write_run(
     directory: &Path,
     run: &Run,

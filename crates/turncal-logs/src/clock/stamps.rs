@@ -40,7 +40,7 @@ impl Clock<'_> {
 /// Position of a row by its stamp: number of kept rows before it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stamp {
-    /// The row is kept, after this number of kept rows.
+    /// The row is kept; this many kept rows precede it.
     New(usize),
     /// The stamp equals that of the previous row.
     Again(usize),
@@ -97,7 +97,7 @@ pub struct Stamps {
 }
 
 impl Stamps {
-    /// A copy for which times must be unique.
+    /// Returns a copy that requires unique times.
     pub fn without_bursts(self) -> Self {
         Self {
             bursts: false,
@@ -105,7 +105,7 @@ impl Stamps {
         }
     }
 
-    /// Accepts the row unless it duplicates a row at its time; `is_same` compares the values.
+    /// Accepts the row unless it duplicates a row with the same time; `is_same` compares the values.
     pub fn take(
         &mut self,
         csv: &LogRows,
@@ -315,7 +315,7 @@ impl Stamps {
         });
     }
 
-    /// Sample time for this logged time, with shortened pauses.
+    /// Sample time for this logged time, after pauses have been shortened.
     pub fn told(&self, time: f64) -> f64 {
         // Samples begin about where their stamps are.
         let behind = |pause: &Pause| pause.until - 0.5 * BREAK <= time;
@@ -350,7 +350,7 @@ impl Stamps {
         csv.error_here(
             format_args!("a time that steps back from {from} to {to}"),
             "increasing times",
-            "Sort the rows, name another time column, or split the file where the clock was set.",
+            "Sort the rows, name another time column, or split the file at the line where the clock was set.",
         )
     }
 
@@ -423,8 +423,8 @@ impl Stamps {
             TimeUnit::Count => (missing > 0).then(|| {
                 format!(
                     "Rows are missing, and the counter wraps every {} samples ({} s). Each gap may be longer by one or \
-                        more of these periods; all later times are then too early by as much. Use a time that does not \
-                        wrap, or split the recording at the gaps.",
+                     more of these periods, and all later times would then be too early by the same amount. Use a time \
+                     that does not wrap, or split the recording at the gaps.",
                     (size / self.period()).round(),
                     nanoseconds(size)
                 )

@@ -40,7 +40,7 @@ pub struct Heading {
     pub rate: Option<f64>,
     /// Statements of the file that are ignored or interpreted.
     pub remarks: Vec<String>,
-    /// Number of first lines that are not rows.
+    /// Number of lines at the beginning that are not rows.
     pub above: usize,
     /// Number of rows among the first lines.
     pub rows: usize,
@@ -202,7 +202,7 @@ impl Looks {
         Self(lines.map(Look::of).collect())
     }
 
-    /// Samples of a labelled stream, and the other lines.
+    /// The samples of a labelled stream, and the other lines.
     pub fn of_stream<'a>(
         lines: impl Iterator<Item = &'a Line>,
         labelled: &Labelled,
@@ -384,7 +384,7 @@ impl Looks {
             None if !is_near => numbered(first),
             None if has_numbers => Named {
                 cut: Some(format!(
-                    "Line {} has {} fields, the rows below it have {columns}. turncal left it out.",
+                    "Line {} has {} fields, but the rows below it have {columns}. turncal left this line out.",
                     look.number,
                     fields.len()
                 )),
@@ -409,8 +409,8 @@ impl Looks {
         })
     }
 
-    /// Tags of rows of several kinds: words, or small numbers before a time, in rows with different widths or too few
-    /// columns for both triads.
+    /// Tags that distinguish several kinds of rows. Tags are words, or small numbers before a time, in rows that have
+    /// different widths or too few columns for both triads.
     pub fn tags(&self) -> Option<Tags> {
         let rows = || {
             self.0
@@ -468,7 +468,7 @@ fn clocks(rows: &[Vec<String>], columns: usize) -> Vec<Option<ClockText>> {
 fn orientation(says: &[&str]) -> Option<String> {
     let letters = value(says, "orientation")?;
     Some(format!(
-        "turncal did not apply the orientation {letters} that the file states; the columns were used unchanged."
+        "turncal did not apply the orientation {letters} that the file states; it used the columns unchanged."
     ))
 }
 
@@ -593,12 +593,12 @@ fn is_number(field: &str) -> bool {
 pub enum Delimiter {
     /// A single byte.
     Byte(u8),
-    /// Any number of spaces and tabs.
+    /// Fields are separated by any number of spaces and tabs.
     Blanks,
 }
 
 impl Delimiter {
-    /// The separator in a first row.
+    /// The separator used in a first row.
     pub fn of_row(row: &str) -> Self {
         let blanks = Self::Blanks.fields(row).unwrap_or_default();
         if blanks.len() > 1 && blanks.iter().all(|field| is_number(field)) {
@@ -629,7 +629,7 @@ impl Delimiter {
         )
     }
 
-    /// Separator byte in the returned lines.
+    /// The byte that separates fields in the returned lines.
     pub fn byte(self) -> u8 {
         match self {
             Self::Byte(byte) => byte,
@@ -642,7 +642,7 @@ impl Delimiter {
         self.byte() != b','
     }
 
-    /// Leaves one delimiter between two fields.
+    /// Reduces the delimiters between two fields to one.
     pub fn tidy(self, line: &mut Vec<u8>) {
         if self == Self::Blanks {
             collapse_blanks(line);

@@ -1,7 +1,7 @@
-//! Lines by their shape: the words and signs of a line, with every number and time replaced by a mark.
+//! The shape of a line: its words and signs, with every number and time replaced by a mark.
 //!
-//! Shapes that repeat are streams of samples. The text before a mark is the name of its value; a line with a rare shape
-//! is a remark, a damaged row or the text of a starting device.
+//! Lines whose shapes repeat form streams of samples. The text before a mark is the name of its value; a line with a
+//! rare shape is a remark, a damaged row or the text of a starting device.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -215,12 +215,12 @@ fn mixed(text: &[u8], is_in_word: bool) -> Option<(usize, u8)> {
 /// Successive lines of these shapes that form one sample.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Stream {
-    /// A word that distinguishes the stream from the others in its file.
+    /// A word that distinguishes the stream from the other streams in the file.
     pub name: String,
     shapes: Vec<Vec<u8>>,
-    /// Names of its values; empty if there is no word before a value.
+    /// Names of the values in a sample; a name is empty if no word precedes the value.
     pub names: Vec<String>,
-    /// Units of its values; empty if not stated.
+    /// Units of the values in a sample; empty if not stated.
     pub units: Vec<String>,
 }
 
@@ -349,7 +349,7 @@ impl Kind {
     }
 }
 
-/// A sample read line by line.
+/// A sample that is read line by line.
 #[derive(Debug, Default)]
 pub struct Sample {
     values: Vec<u8>,
@@ -363,13 +363,13 @@ pub enum Added {
     Complete,
     /// Values before others.
     Part,
-    /// No values, because the line has another shape.
+    /// The line has another shape and contributes no values.
     Nothing,
 }
 
 impl Sample {
-    /// Adds the values of a line; once the sample is complete, they are replaced by the values of the sample. A sample
-    /// with missing lines is left out.
+    /// Adds the values of a line; once the sample is complete, they are replaced by the values of the sample. Samples
+    /// with missing lines are left out.
     pub fn add(&mut self, labelled: &Labelled, stream: &Stream, line: &mut Vec<u8>) -> Added {
         let marked = Marked::of(line, labelled.comma);
         let is = |part: usize| stream.shapes.get(part) == Some(&marked.shape);

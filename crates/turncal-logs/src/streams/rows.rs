@@ -9,7 +9,7 @@ use crate::data_file::DataFile;
 use crate::rows::Rows;
 use turncal_input::{FileError, Place, list, suggestion};
 
-/// A log at one sample of one of its streams.
+/// A log, positioned at one sample of one of its streams.
 pub struct StreamRows {
     file: PathBuf,
     log: Box<dyn Log>,
@@ -32,11 +32,11 @@ pub struct StreamRows {
 pub struct Found {
     /// The stream.
     pub stream: Stream,
-    /// Number of its samples.
+    /// Number of samples in the stream.
     pub samples: u64,
 }
 
-/// All streams of a log with samples, and the error at the first damage.
+/// All streams of a log that contain samples, and the error at the first damage.
 pub fn survey(file: &Path, mut log: Box<dyn Log>) -> (Vec<Found>, Option<FileError>) {
     let mut samples: Vec<u64> = Vec::new();
     let mut row = Vec::new();
@@ -69,7 +69,7 @@ const CUT_OFF: &str = "Copy or record the file again, or set `salvage = true` to
                        before this point.";
 
 impl StreamRows {
-    /// Opens a stream with at least one sample; without a name, the only stream.
+    /// Opens a stream with at least one sample; if no name is given, opens the only stream.
     pub fn open(
         file: &DataFile,
         mut log: Box<dyn Log>,

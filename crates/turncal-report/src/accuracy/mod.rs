@@ -28,7 +28,7 @@ pub fn document(accuracy: &Accuracy) -> Document {
     document.both(tables::gain(accuracy));
     document.both(tables::consistency(accuracy));
     document.both(tables::auxiliary(accuracy));
-    document.both(explained(&accuracy.effects).note("This evidence is from the first run."));
+    document.both(explained(&accuracy.effects).note("The evidence is from the first run."));
     document.pages(figures::figures(accuracy));
     document.data = data(accuracy);
     document
@@ -54,7 +54,10 @@ pub fn facts(accuracy: &Accuracy) -> Facts {
     let mut facts = Facts::new("The study", [("scenario", what)]);
     let runs = format!("{}, seed {}", count(accuracy.trials.len()), study.seed);
     facts.push("runs", runs);
-    let forms = format!("filter {form}, truth {truth}; compared in the general form");
+    let forms = format!(
+        "the filter uses the {form} form and the truth the {truth} form; both are compared in the \
+                         general form"
+    );
     facts.push("misalignment", forms);
     facts.push("aiding", aiding);
     facts.push("error terms", terms(accuracy));

@@ -115,8 +115,8 @@ fn against_bound(accuracy: &Accuracy) -> (bool, String) {
         return (true, text.to_owned());
     }
     let text = format!(
-        "The ratio of RMS error to bound differs from 1 beyond its 99 % interval: {outside}. One interval in a \
-         hundred does so by chance."
+        "The ratio of RMS error to bound differs from 1 beyond its 99 % interval: {outside}. This happens by chance \
+         for one interval in a hundred."
     );
     (false, text)
 }
@@ -190,7 +190,7 @@ fn form(accuracy: &Accuracy) -> Option<(bool, String)> {
         count(tested)
     );
     if form.holds(truth) {
-        text += " It is the correct form; one run in a thousand rejects it by chance.";
+        text += " This form is correct; one run in a thousand rejects the correct form by chance.";
     }
     // Three σ of a Poisson count beyond its mean by chance.
     let by_chance = 1e-3 * tested as f64;

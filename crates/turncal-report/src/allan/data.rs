@@ -92,7 +92,7 @@ fn axis(axis: &AxisNoise, sensor: Sensor) -> Value {
 /// A field of `[imu.noise]`: key, value, and a comment or nothing.
 type Field = (&'static str, f64, String);
 
-/// `[imu.noise]` with all detected processes, ready to paste.
+/// `[imu.noise]` with all detected processes, ready to be pasted into run.toml.
 pub fn noise_table(analysis: &NoiseAnalysis) -> String {
     let mut text = "[imu.noise]\n".to_owned();
     for &sensor in &analysis.sensors {
@@ -140,7 +140,7 @@ fn of_triad(analysis: &NoiseAnalysis, sensor: Sensor) -> Vec<Field> {
     let comment = "1σ of a Gauss–Markov process fitted to the deviations";
     fields.push((key, of.sigma / unit, comment.to_owned()));
     let open = if figures.correlation_is_open {
-        "longest that the recording can show; σ grows with its square root"
+        "the longest that the recording can show; σ grows with the square root of this time"
     } else {
         ""
     };

@@ -58,7 +58,7 @@ pub fn coefficients(analysis: &NoiseAnalysis, sensor: Sensor) -> Table {
         .chain(axes)
         .chain(["triad".to_owned()]);
     let table = Table::new(capital(triad_name(sensor)), headings).section(rows).note(
-        "± 1σ. <: slope not detected, 95 % upper limit. triad: from the mean of the three variances.",
+        "± 1σ. <: the slope was not detected; 95 % upper limit. Triad: from the mean of the three variances.",
     );
     match of_a_pulse(*analysis.pulse.get(sensor), sensor) {
         Some(note) => table.note(note),

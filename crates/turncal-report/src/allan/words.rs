@@ -14,20 +14,21 @@ const SMALL: f64 = 0.02;
 fn left_out(of: &Identified, taus: &[f64]) -> Option<String> {
     let from = taus.get(of.first).filter(|_| of.first > 0)?;
     Some(format!(
-        "no process fits its deviations below {}, because of pulses coarser than the noise or the sensor bandwidth. \
-         The coefficients use the longer cluster times.",
+        "no process fits its deviations below {}, because the pulses are coarser than the noise or the bandwidth of \
+         the sensor is limited. The coefficients use the longer cluster times.",
         duration(*from)
     ))
 }
 
 pub const METHOD: &str = "Overlapping Allan variance of the rate (NIST SP 1065, 5.2.4) at two cluster times per \
-    octave. Coefficients: non-negative generalised least-squares fit of the variances as a sum of processes (IEEE \
-    Std 952, annex C; El-Sheimy, Hou, Niu 2008). The weights are the covariance of the points under these processes, \
-    from their generalised autocovariances (Greenhall, Riley 2003), which also give the equivalent degrees of \
-    freedom. turncal selects the most likely combination; each process must raise twice the log-likelihood by 9 \
-    (3σ), and a correlation time by 4 more. Short cluster times that no combination fits (pulses coarser than the \
-    noise, or sensor bandwidth) are excluded. Bias instability B is the coefficient of flicker noise, whose floor is \
-    0.664 B.";
+                          octave. Coefficients: non-negative generalised least-squares fit of the variances as a sum \
+                          of processes (IEEE Std 952, annex C; El-Sheimy, Hou, Niu 2008). The weights are the \
+                          covariance of the points under these processes, from their generalised autocovariances \
+                          (Greenhall, Riley 2003), which also give the equivalent degrees of freedom. turncal selects \
+                          the most likely combination; each process must raise twice the log-likelihood by 9 (3σ), and \
+                          a correlation time by 4 more. Short cluster times that no combination fits, because of \
+                          coarse pulses or a limited sensor bandwidth, are excluded. Bias instability B is the \
+                          coefficient of flicker noise, whose floor is 0.664 B.";
 
 /// Warnings about the figures.
 pub fn warnings(analysis: &NoiseAnalysis) -> Vec<String> {
@@ -108,7 +109,7 @@ fn unlike(triad: &TriadNoise, sensor: Sensor) -> Option<String> {
     })
 }
 
-/// For each undetected slope of a triad: its upper limit, and how to measure it.
+/// For each slope of a triad that was not detected: its upper limit, and how to measure it.
 pub fn advice(analysis: &NoiseAnalysis) -> Vec<String> {
     let mut sentences = Vec::new();
     for &sensor in &analysis.sensors {
@@ -119,23 +120,23 @@ pub fn advice(analysis: &NoiseAnalysis) -> Vec<String> {
             let longer = |factor: f64| duration(factor * analysis.duration());
             let how = match process {
                 Process::Quantisation => {
-                    "a higher sample rate would show it, a longer recording would not"
+                    "a higher sample rate would show this process, but a longer recording would not"
                         .to_owned()
                 }
                 Process::BiasInstability if found(Process::RateRandomWalk) => {
-                    "random walk and rate random walk hide it, so a longer recording would not show it"
+                    "random walk and rate random walk hide this process, so a longer recording would not show it"
                         .to_owned()
                 }
                 Process::BiasInstability | Process::RateRandomWalk if found(Process::RateRamp) => {
-                    "the ramp hides it, so record after warm-up at constant temperature"
+                    "the ramp hides this process, so record after warm-up at constant temperature"
                         .to_owned()
                 }
                 Process::RateRandomWalk => format!(
-                    "a recording twice as long ({}) would show half of that",
+                    "a recording twice as long ({}) would show half of this value",
                     longer(2.0)
                 ),
                 _ => format!(
-                    "a recording four times as long ({}) would show half of that",
+                    "a recording four times as long ({}) would show half of this value",
                     longer(4.0)
                 ),
             };

@@ -1,4 +1,4 @@
-//! Attitudes reached, and those missing, as a map of the sphere.
+//! Map of the sphere with the attitudes that were reached and those that are missing.
 
 use std::f64::consts::TAU;
 

@@ -16,7 +16,7 @@ const WRITTEN: f64 = 0.2;
 const FAINT: f64 = 0.02;
 
 impl Report<'_> {
-    /// All figures with data.
+    /// All figures for which there are data.
     pub fn figures(&self) -> Vec<Plot> {
         let mut plots = Vec::new();
         if let Some(outcome) = self.against_time() {
@@ -29,7 +29,7 @@ impl Report<'_> {
         plots
     }
 
-    /// The filter result if it has a single time axis; several recordings do not have one.
+    /// The filter result, if it has a single time axis; the result of several recordings does not.
     pub fn against_time(&self) -> Option<&Outcome> {
         self.outcome.filter(|outcome| outcome.alone.len() < 2)
     }
@@ -68,7 +68,8 @@ impl Report<'_> {
              turns. A flat line means the parameter was not observed."
                 .to_owned();
         if truth.is_some() {
-            caption += " Dashed: the largest true error in the group; it should end within a few σ of the lines.";
+            caption += " Dashed: the largest true error in the group; at the end, it should be within a few σ of the \
+                        lines.";
         }
         let (heading, panels) = ("Accuracy against time", Group::all().filter_map(panel));
         let plot = Plot::new("sigma.svg", heading, (3, 330), panels);
@@ -108,8 +109,8 @@ impl Report<'_> {
         let panels: Vec<Panel> = panels.collect();
         let caption = format!(
             "Innovations of the last pass divided by their σ; they should look like white noise of unit variance. \
-             Solid lines: ±1σ; dashed: ±3σ. Dense data are drawn as the extremes of each interval. \
-             Points at the edge: ±{EDGE}σ or more."
+             Solid lines: ±1σ; dashed: ±3σ. Where data are dense, only the extremes of each interval are drawn. Points \
+             at the edge: ±{EDGE}σ or more."
         );
         let drawn = !panels.is_empty();
         let plot = Plot::new("innovations.svg", "Innovations", (3, 270), panels);

@@ -27,8 +27,8 @@ pub use report::{ClosedForm, Report};
 pub use solved::{Truth, document, dwell_times, note, within};
 pub use tables::cross_validation;
 
-/// Order of findings: the most severe first; within a level, the first of each kind, then further ones of a kind, then
-/// the assumptions of the reader.
+/// Sorts the findings, the most severe first. Within a level, the first finding of each kind precedes further findings
+/// of the same kind, and the assumptions made on reading come last.
 pub fn in_order(findings: &[Finding]) -> Vec<Finding> {
     let mut seen = BTreeSet::new();
     let keyed = findings.iter().map(|finding| {
@@ -41,7 +41,7 @@ pub fn in_order(findings: &[Finding]) -> Vec<Finding> {
 }
 
 impl Report<'_> {
-    /// The complete report on the calibration. Its named values are in the calibration file.
+    /// The complete report on the calibration. The named values of the report are in the calibration file.
     pub fn document(&self) -> Document {
         let mut document = Document::new(self.title);
         document.verdict = values::verdict(self.calibration);

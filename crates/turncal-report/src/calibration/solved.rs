@@ -11,7 +11,7 @@ use turncal::imu::{PerSensor, Triad};
 use turncal::lot::Specification;
 use turncal::study::{CheckedCalibration, Consequences};
 
-/// A true calibration, in the general form, with its error terms.
+/// The true calibration in the general form, with its error terms.
 pub struct Truth {
     /// Both triads.
     pub triads: PerSensor<Triad>,
@@ -19,7 +19,7 @@ pub struct Truth {
     pub terms: BTreeMap<String, TermRecord>,
 }
 
-/// The report on a problem of this name, on its calibration and the consequences of the calibration.
+/// The report on the calibration of a problem with this name, and on its consequences for navigation.
 pub fn document(
     (problem, name): (&Problem, &str),
     (checked, consequences): (&CheckedCalibration, &Consequences),

@@ -58,7 +58,7 @@ impl Report<'_> {
     }
 }
 
-/// The least observed directions: all unobserved ones and some observed ones.
+/// The least observed directions: all that are not observed, and some that are.
 pub fn weakest(outcome: &Outcome) -> Table {
     let observability = &outcome.observability;
     let shown = observability.unobserved().count() + WEAKEST;
@@ -67,7 +67,8 @@ pub fn weakest(outcome: &Outcome) -> Table {
         .section(rows.map(|of| vec![of.words.clone(), improvement(1.0, of.remaining)]))
         .note(
             "Combinations of parameters, each in units of its prior σ, that the data determine independently of each \
-             other. “With” joins errors of the same sign, “against” errors of opposite sign.",
+             other. “With” joins parameters whose errors have the same sign, “against” parameters whose errors have \
+             opposite signs.",
         )
 }
 
@@ -76,7 +77,7 @@ fn observed(outcome: &Outcome) -> impl Iterator<Item = (&'static str, Nis)> {
     kinds.map(|(observation, nis)| (observation.name(), nis))
 }
 
-/// NIS of each kind of observation with its interval.
+/// NIS of each kind of observation, with its 95 % interval.
 pub fn nis(outcome: &Outcome) -> Vec<String> {
     let shown = |(name, nis): (&str, Nis)| {
         let (low, high) = nis.interval;
@@ -86,7 +87,7 @@ pub fn nis(outcome: &Outcome) -> Vec<String> {
     observed(outcome).map(shown).collect()
 }
 
-/// Consistency of the innovations with their covariance.
+/// Table of the consistency of the innovations with their covariance.
 pub fn consistency(outcome: &Outcome) -> Table {
     let rows = observed(outcome).map(|(name, nis)| {
         let (low, high) = nis.interval;
@@ -109,7 +110,7 @@ pub fn consistency(outcome: &Outcome) -> Table {
     )
 }
 
-/// Residuals in dwells excluded from the fit, on one line.
+/// One line with the residuals in dwells excluded from the fit.
 pub fn cross_validation(quality: &Quality) -> Option<String> {
     let held_out = quality.held_out.as_ref()?;
     let of = |name: &str, spread: &Spread, units: &[(&'static str, f64); 2]| {

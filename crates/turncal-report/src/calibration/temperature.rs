@@ -9,7 +9,7 @@ use turncal::imu::{InstallationForm, RATE, Sensor};
 /// Number of points of a curve.
 const POINTS: usize = 81;
 
-/// Change of parameters with temperature, if they depend on it.
+/// Change of the parameters with temperature, if they depend on temperature.
 pub fn figure(outcome: &Outcome) -> Option<Plot> {
     let thermal = outcome.thermal.as_ref()?;
     let reference = outcome.estimate.vector();
@@ -26,7 +26,7 @@ pub fn figure(outcome: &Outcome) -> Option<Plot> {
     Some(curves(&outcome.estimate, thermal, marks, alone))
 }
 
-/// Adds tables and figures, if anything changes or differs.
+/// Adds tables and figures, if parameters change with temperature or differ between recordings.
 pub fn add(document: &mut Document, outcome: &Outcome) {
     if let Some(thermal) = &outcome.thermal {
         let form = outcome.estimate.form();
@@ -76,8 +76,8 @@ pub fn orders(form: InstallationForm, thermal: &Thermal) -> Table {
             rows.filter_map(|i| row(group, i)).collect::<Vec<_>>()
         }))
         .note(format!(
-            "Legendre coefficients ± 1σ over {ranges}: change of the parameter over half the range. Each order is \
-             averaged over its absence and its usual sizes."
+            "Legendre coefficients ± 1σ over {ranges}: each is the change of the parameter over half the range. Each \
+             order is averaged over its absence and its usual sizes."
         ))
 }
 
@@ -104,8 +104,8 @@ pub fn hysteresis(form: InstallationForm, thermal: &Thermal) -> Table {
     .section(rows)
 }
 
-/// Every parameter against temperature, with marks of this meaning: temperature and change of the parameter from the
-/// reference.
+/// Figure of every parameter against temperature. Each mark is at a temperature and shows the change of the parameter
+/// from the reference; `meaning` describes the marks.
 pub fn curves(
     estimate: &Estimate,
     thermal: &Thermal,
@@ -192,7 +192,7 @@ fn differences(outcome: &Outcome) -> Table {
     )
     .section(rows)
     .note(
-        "Spread: standard deviation of the single-recording estimates about the common curve; by σ alone: value \
+        "Spread: standard deviation of the single-recording estimates about the common curve; by σ alone: the spread \
          expected from their σ. If χ²/n exceeds its limit, the instrument does not repeat; state the difference in \
          [day_to_day].",
     )

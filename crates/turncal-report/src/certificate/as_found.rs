@@ -20,14 +20,14 @@ pub struct AsFound {
 /// Change of a parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Change {
-    /// Earlier value, with the uncertainty of the earlier calibration (zero if not stated).
+    /// Value in the earlier calibration, with its uncertainty (zero if not stated).
     pub found: Measured,
     /// Value now.
     pub left: Measured,
 }
 
 impl Change {
-    /// The value now minus the earlier one.
+    /// The present value minus the earlier value.
     pub fn difference(&self) -> f64 {
         self.left.value - self.found.value
     }

@@ -48,11 +48,11 @@ impl Decision {
 /// Decision on a parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Decided {
-    /// Its name in the general form.
+    /// Name of the parameter in the general form.
     pub name: String,
     /// The limit.
     pub limit: Limit,
-    /// Distance from the centre of the limit, in SI.
+    /// Distance of the value from the centre of the limits, in SI units.
     pub off: f64,
     /// 1σ of this distance.
     pub sigma: f64,
@@ -82,7 +82,7 @@ impl Conformity {
     }
 }
 
-/// Decision on a parameter at this distance from the centre of a limit, and the probability that it is wrong. A guard
+/// Decision on a parameter at this distance from the centre of a limit, and the probability that it is wrong. The guard
 /// band is the expanded uncertainty, k σ.
 pub fn decide(
     off: f64,

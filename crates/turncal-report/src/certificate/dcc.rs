@@ -1,7 +1,7 @@
 //! The certificate as a Digital Calibration Certificate: PTB's DCC 3.3.0 with D-SI 2.2.1 quantities.
 //!
-//! Values are in SI: scale factors relative to nominal, angles in rad, biases in rad/s and m/s², each as a separate
-//! quantity with its expanded uncertainty, followed by the covariance of all.
+//! Values are in SI units: scale factors relative to nominal, angles in rad, biases in rad/s and m/s², each as a
+//! separate quantity with its expanded uncertainty, followed by the covariance of all.
 
 use maud::{Markup, html};
 use statrs::distribution::{ChiSquared, ContinuousCDF};

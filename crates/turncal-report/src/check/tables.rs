@@ -38,7 +38,7 @@ pub fn log_columns(run: &Run) -> Table {
         ),
     )
     .section(rows)
-    .note("Body axes are right, front, up. Step: resolution (all values are multiples of it).")
+    .note("Body axes are right, front, up. Step: resolution of the log (all values are multiples of the step).")
 }
 
 /// Columns of the log with triad and axis.
@@ -133,10 +133,10 @@ pub fn dwells(run: &Run, survey: &Survey) -> Table {
     Table::new("Dwells, and the turns after them", headings)
         .section(survey.rests.iter().enumerate().map(row))
         .note(
-            "From nominal scales and prior biases. Tilt: angle between that axis and the vertical. By: right-handed \
-             angle, with the gyro output in the previous dwell as zero; at: maximum rate. Off gravity: angle between \
-             the vertical carried to the next dwell by the gyros and the vertical measured there by the \
-             accelerometers.",
+            "The angles are computed with nominal scales and prior biases. Tilt: angle between the upward axis and the \
+             vertical. By: right-handed angle, with the gyro output in the previous dwell as zero. At: maximum rate. \
+             Off gravity: angle between the vertical carried to the next dwell by the gyros and the vertical measured \
+             there by the accelerometers.",
         )
 }
 
@@ -188,7 +188,7 @@ pub fn methods(survey: &Survey) -> Table {
     let heading = "What each method could observe, 1σ";
     let mut table = Table::new(heading, group_columns("")).note(
         "Predicted 1σ in the general form (RMS per group), from the prior σ and a linearisation at the filter start; \
-         for the closed form, from its equations. Noise of hand motion and error terms are not included.",
+         for the closed form, from its equations. The prediction does not include the noise of hand motion or the error terms.",
     );
     let mut rows = Vec::new();
     for (path, expected) in &survey.methods {

@@ -42,7 +42,7 @@ pub fn signed(angle: f64) -> String {
     format!("{plus}{}", degrees(angle))
 }
 
-/// The log in a sentence or two.
+/// A description of the log in one or two sentences.
 pub fn log(run: &Run, survey: &Survey) -> String {
     let mut text = format!(
         "Stationary for {} s in total, at most {} s at a time; {}.",
@@ -94,7 +94,7 @@ fn warming(run: &Run) -> String {
         if span < SOAKED {
             "soaked within 1 K"
         } else {
-            "not soaked, so parameters may change during the recording (see calibrate --temperature)"
+            "the instrument is not soaked, so parameters may change during the recording (see calibrate --temperature)"
         }
     )
 }
@@ -118,7 +118,7 @@ pub fn of_survey(survey: &Survey) -> Vec<String> {
     findings
 }
 
-/// Disagreement between a label and the recording.
+/// Describes the disagreement between a label and the recording.
 pub fn of_label(check: &LabelCheck) -> Option<String> {
     let said = check.disagreement.as_ref()?;
     let at = value(check.segment.start, 1.0);
@@ -134,8 +134,8 @@ fn of_motion(survey: &Survey) -> Vec<String> {
     if survey.rests.len() < 2 {
         findings.push(format!(
             "The recording has fewer than two dwells. Keep the instrument stationary for {LONG_ENOUGH} s or more \
-             between turns. If the instrument was stationary, bias_sigma of the gyros or the noise in run.toml is too \
-             small: check both."
+             between turns. If the instrument was stationary, check bias_sigma of the gyros and the noise in run.toml: \
+             one of them is too small."
         ));
         return findings;
     }

@@ -122,8 +122,8 @@ fn verdict(row: &Row) -> String {
     }
 }
 
-/// Every quantity: the calibrations side by side if they are few, with truth or difference; mean and scatter of three
-/// or more.
+/// Table of every quantity. A few calibrations are shown side by side, with the truth or the difference; three or more
+/// have a mean and a scatter.
 pub fn quantities(lot: &Lot) -> Table {
     let mut columns = Columns::<Quantity>(Vec::new());
     columns.push("", title);
@@ -284,7 +284,8 @@ fn notes(lot: &Lot, mut table: Table) -> Table {
     }
 }
 
-/// Every limit of a single unit, exceeded ones first; for several units, only limits that are exceeded or undecided.
+/// For a single unit, all limits, with the exceeded limits first; for several units, only limits that are exceeded or
+/// undecided.
 pub fn limits(lot: &Lot) -> Table {
     let row = |row: &Row, check: &Check| {
         let quantity = check.quantity();
@@ -316,7 +317,7 @@ pub fn limits(lot: &Lot) -> Table {
     Table::new(heading, columns("unit | | unit | from nominal | limit | P(within) | verdict"))
         .section(rows)
         .note(
-            "A unit passes a limit if the probability of being within it is at least the stated confidence, and fails \
-             if the probability of being outside is.",
+            "A unit passes a limit if the probability of being within the limit is at least the stated confidence, and \
+             fails if the probability of being outside is at least the stated confidence.",
         )
 }

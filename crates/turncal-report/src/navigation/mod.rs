@@ -26,7 +26,8 @@ pub struct Navigation<'a> {
     pub truth: &'a str,
     /// Verdict of the calibration; `None` if it was not estimated.
     pub verdict: Option<Word>,
-    /// Whether one of the two has error terms in addition to K, E and D (navigation does not use them).
+    /// Whether the calibration or the truth has error terms in addition to K, E and D; navigation does not use error
+    /// terms.
     pub terms: bool,
     /// Definition of the body axes.
     pub body_frame: BodyFrame,
@@ -34,7 +35,7 @@ pub struct Navigation<'a> {
     pub only: Option<Sensor>,
     /// Motion of the body and its duration.
     pub mission: &'a Mission,
-    /// Name of the trajectory, if it moved.
+    /// Name of the trajectory, if the body moved.
     pub trajectory: Option<&'a str>,
     /// The errors.
     pub navigated: &'a MethodOutlook,

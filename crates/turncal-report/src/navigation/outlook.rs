@@ -36,7 +36,7 @@ pub fn add_missions(document: &mut Document, methods: &[String], missions: &[Flo
     document.brief.insert(1, table.into());
 }
 
-/// Adds table and figure.
+/// Adds the table and the figure.
 pub fn add(document: &mut Document, navigation: Result<&[MethodOutlook], &NavigationStudyError>) {
     match navigation {
         Err(reason) => {
@@ -46,8 +46,8 @@ pub fn add(document: &mut Document, navigation: Result<&[MethodOutlook], &Naviga
         Ok([]) => {}
         Ok(navigated @ [.., last]) => {
             let how = format!(
-                "{} stationary and level at the site of the run, heading North, from perfect alignment, height \
-                 fixed, for as long as predicted errors stay small (1° and 1 % of the Earth's radius).",
+                "{} stationary and level at the site of the run, heading North, from perfect alignment, height fixed, \
+                 as long as the predicted errors stay small (below 1° and 1 % of the Earth's radius).",
                 long(navigated)
             );
             document.page(table(HEADING, navigated).note(how));
@@ -78,7 +78,7 @@ fn long(navigated: &[MethodOutlook]) -> String {
     format!("{} {unit}", value(duration(navigated) / size, 10.0))
 }
 
-/// The position at the end in one line.
+/// One line with the position error at the end.
 pub fn line(navigated: &[MethodOutlook]) -> String {
     let [.., horizontal] = Quantity::ALL;
     let ends = navigated.iter().filter_map(|of| {
@@ -101,7 +101,7 @@ pub fn line(navigated: &[MethodOutlook]) -> String {
     )
 }
 
-/// Every quantity at the end of navigation, and its maximum if errors are known.
+/// Table of every quantity at the end of navigation, with its maximum if the errors are known.
 pub fn table(heading: &str, navigated: &[MethodOutlook]) -> Table {
     let known = is_known(navigated);
     let (unit_of_time, second) = clock(navigated);
@@ -184,8 +184,8 @@ fn figure(navigated: &[MethodOutlook], last: &str) -> Plot {
     } else {
         (
             "Predicted position error in navigation",
-            "±1σ of the error predicted from the covariance of the calibration, with perfect alignment, stationary \
-             and level, with fixed height."
+            "Predicted ±1σ of the error, from the covariance of the calibration, for a stationary and level instrument \
+             with perfect alignment and fixed height."
                 .to_owned(),
         )
     };
@@ -196,7 +196,8 @@ fn figure(navigated: &[MethodOutlook], last: &str) -> Plot {
     Plot::new("navigation.svg", heading, (1, 250), panels).caption(caption)
 }
 
-/// Errors against time in a readable unit, over the ±σ band of the last calibration; only σ if no error is known.
+/// Figure of the errors against time in a readable unit, drawn over the ±σ band of the last calibration; only σ if no
+/// error is known.
 pub fn panel(quantity: Quantity, navigated: &[MethodOutlook]) -> Panel {
     let (unit_of_time, second) = clock(navigated);
     let (unit, scale) = quantity.readable_unit(greatest(quantity, navigated));

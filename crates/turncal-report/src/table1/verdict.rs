@@ -1,4 +1,4 @@
-//! Verdicts on the figures in the paper, in words.
+//! Verdicts in words on the figures in the paper.
 
 use crate::prelude::*;
 use turncal::imu::InstallationForm;
@@ -85,7 +85,7 @@ pub fn sentence(column: &Column) -> String {
     }
 }
 
-/// A column of the paper in words.
+/// The name of a column in the paper, in words.
 pub fn title(published: &Published) -> String {
     let equation = match published.form {
         InstallationForm::ThreeAngle => 10,

@@ -61,7 +61,7 @@ kinds! {
         "turncal repaired or assumed something when it read the log: it bridged gaps, dropped rows, corrected an \
          uneven clock, or assumed a location or noise figure that run.toml does not state. The σ include the effect. \
          If the text names a field, state it in run.toml. `turncal check` lists all faults of a log."
-        "The record was repaired, or completed by assumptions, before the evaluation; U includes the effect."
+        "Before the evaluation, the record was repaired or completed with assumptions; U includes the effect."
     NotConverged = "W02" "not-converged" Failed:
         "A parameter was still changing when the iterations ended, so neither the values nor the σ can be used. The \
          usual causes are a wrong scale, unit, sample period or axis in run.toml, or a recording with almost no \
@@ -70,13 +70,13 @@ kinds! {
     Unexplained = "W03" "unexplained" Failed:
         "The residuals are too large for any noise figure, so the values are meaningless. The usual causes are labels \
          or table attitudes from a different recording, a wrong axis order, a wrong unit, or a mount that slipped. \
-         Look first at the interval with the largest residuals, given in the finding."
+         Look first at the interval with the largest residuals, which the finding gives."
         "The residuals of the evaluation are unexplained; the results must not be used."
     NotObserved = "W04" "not-observed" Partial:
         "The recording adds little information about these parameters: each σ is still more than half of the prior σ, \
          so turncal keeps the values and σ of [imu.prior]. Add positions that put each axis up and down, and a turn of \
          90° or more about each axis. `turncal check` predicts the σ of each parameter."
-        "The record adds little to what was assumed about some parameters."
+        "For some parameters, the record adds little to the values assumed beforehand."
     CombinationsNotObserved = "W05" "combinations-not-observed" Care:
         "Each of these parameters is determined on its own, but a combination of them is not, because their errors \
          cancel in every position of this path. Add positions or turns in which they have different effects. The \
@@ -84,12 +84,13 @@ kinds! {
         "Some parameters are determined only in combination with others; use them together with the covariance \
          matrix."
     HeadingNotObserved = "W06" "heading-not-observed" Note:
-        "The gyros do not sense Earth rate well enough to find north. K, E and D do not need the heading, but the \
-         gyro biases are less accurate because Earth rate is less certain. If you need the heading, use a table, or \
-         gyros with noise below 0.1 °/√h and dwells of one minute."
-        "The gyroscopes do not show north; U of the gyroscope biases includes the unknown part of Earth rate."
+        "The gyros do not sense Earth rate well enough to find north. K, E and D can be determined without the \
+         heading, but the gyro biases are less accurate because Earth rate is less certain. If you need the heading, \
+         use a table, or gyros with noise below 0.1 °/√h and dwells of one minute."
+        "The gyroscopes cannot determine the direction of north; U of the gyroscope biases includes the unknown part \
+         of Earth rate."
     NoiseLearnt = "W07" "noise-learnt" Care:
-        "A noise figure in [imu.noise] is more than 1.5 times too small for this recording (false-alarm rate 1 in \
+        "The noise of this recording is more than 1.5 times as large as a figure in [imu.noise] (false-alarm rate 1 in \
          1000). turncal used its own estimate for the weights and the σ. To state the estimate for the next recording, \
          copy the lines of the finding into run.toml; to use the stated noise anyway, add --noise stated."
         "The noise of the instrument was estimated from the record, because it exceeds the stated noise."
@@ -100,19 +101,19 @@ kinds! {
         "The noise at standstill differs from the noise stated for the instrument."
     Inconsistent = "W10" "inconsistent" Care:
         "The normalised innovation squared (NIS) is outside its 99.9 % interval: the residuals are larger or smaller \
-         than predicted. If residuals are larger only after moves, suspect the table position, a scale factor or a \
-         time offset; if in dwells, bias drift, often due to temperature (--temperature); if everywhere, the white \
-         noise in [imu.noise]."
+         than predicted. If the residuals are larger only after moves, suspect the table position, a scale factor or a \
+         time offset. If they are larger in dwells, suspect bias drift, often due to temperature (--temperature). If \
+         they are larger everywhere, suspect the white noise in [imu.noise]."
         "The residuals of the evaluation differ from those expected by more than chance explains."
     ErrorTermEstimated = "W12" "error-term-estimated" Note:
         "The recording shows a significant error term, so turncal estimated it together with K, E and D. The values \
-         are valid only together with this term: `turncal apply` corrects it; export formats without error terms leave \
-         its error in and say so. To leave the term out, list the terms that you want with --with."
+         are valid only together with this term: `turncal apply` corrects this error; export formats without error \
+         terms leave the error in and say so. To leave the term out, list only the terms that you want after --with."
         "The results apply together with the error terms listed in this certificate."
     Settling = "W15" "settling" Note:
         "After stops, the attitude differs from the reading of the table by an angle that fades within seconds. \
-         turncal estimated the usual size of this angle, and the σ include it. Wait longer after each stop, or state \
-         settling_sigma_arcsec in [turntable]."
+         turncal estimated the usual size of this angle, and the σ include this error. Wait longer after each stop, or \
+         state settling_sigma_arcsec in [turntable]."
         "The turntable settled for some seconds after its moves; U includes the effect."
     PositionWrong = "W16" "position-wrong" Care:
         "The table attitude in one dwell contradicts the gyros and accelerometers. turncal gave the readings of this \
@@ -130,13 +131,13 @@ kinds! {
         "A bias changed during the calibration; the result is the mean before and after the change."
     EarthRateWrong = "W19" "earth-rate-wrong" Care:
         "In all attitudes, the gyros sense an Earth rate that does not match the stated latitude. turncal estimated \
-         the difference. Check latitude_deg (first its sign) and the north and level of the table."
+         the difference. Check latitude_deg, first its sign, then the north and level of the table."
         "The measured Earth rate differs from that at the stated latitude; the difference was estimated with the \
          results."
     FarFromPrior = "W20" "far-from-prior" Care:
         "Some parameters are many prior σ away from [imu.prior]. Either run.toml contains a wrong unit, scale, sign \
          or axis order, or the prior σ are too small for this instrument. The finding lists likely causes."
-        "Some parameters differ from the data sheet by much more than it allows."
+        "Some parameters differ from the data sheet by much more than its tolerances allow."
     FormRejected = "W21" "form-rejected" Care:
         "The data need more angles than the chosen misalignment form has. The values in this form are therefore wrong \
          by more than their σ. Rerun with --installation general."
@@ -196,7 +197,7 @@ kinds! {
         "This recording cannot show an error term that instruments of this class may have, and K, E or D depend on the \
          term. The σ include its usual size. Add the moves listed in the finding, or state that the instrument does \
          not have the term: sigma = 0 in [imu.terms]. `--with none` leaves out all terms."
-        "U includes the usual size of error terms that the record does not show."
+        "U includes the usual size of error terms that the record cannot show."
 }
 
 impl Kind {

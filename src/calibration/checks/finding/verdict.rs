@@ -35,7 +35,7 @@ pub enum Word {
 }
 
 impl Word {
-    /// Its CSS class on a page.
+    /// The CSS class of the verdict on a page.
     pub fn class(self) -> &'static str {
         match self {
             Self::Good | Self::Pass => "good",
@@ -59,7 +59,7 @@ impl fmt::Display for Word {
     }
 }
 
-/// A word, with the codes of the findings that cause it.
+/// A verdict, with the codes of the findings that lead to it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Verdict {
     /// The word.

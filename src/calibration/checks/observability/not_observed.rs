@@ -12,7 +12,7 @@ use crate::units::DEGREE;
 
 /// All findings on quantities that the path of a filter's run does not determine.
 ///
-/// Parameters that are far from their prior are known; the prior is wrong.
+/// Parameters that are far from their prior count as determined, because the prior is wrong.
 pub fn not_observed_by_path(outcome: &Outcome, far: Option<&Finding>) -> Vec<Finding> {
     let (form, hidden) = (outcome.estimate.form(), outcome.unobserved().into_iter());
     let mut parameters: Vec<String> = hidden.filter_map(|i| parameter_name(form, i)).collect();
@@ -74,8 +74,8 @@ pub fn not_observed(by: &str, parameters: Vec<String>) -> Option<Finding> {
     let remedies = remedies.iter().filter(|(group, _)| has(group));
     let remedies: Vec<&str> = remedies.map(|(_, remedy)| *remedy).collect();
     let text = format!(
-        "Not determined by {by} (σ is still more than half of the prior): {}. The stated values are kept; do not use \
-         them as calibrated. Add {}.",
+        "Not determined by {by} (σ is still more than half of the prior): {}. turncal kept the stated values; do not \
+         use them as calibrated values. Add {}.",
         listed(&parameters),
         remedies.join(", and ")
     );

@@ -21,11 +21,11 @@ pub struct Mounting {
     pub log_ratio: f64,
     /// The corrected line for `run.toml`.
     pub line: String,
-    /// Lines for other axis orders that the recording cannot separate from this order.
+    /// Lines for other axis orders that the recording cannot distinguish from this order.
     pub others: Vec<String>,
     /// Whether a latitude of opposite sign would explain the motion equally well.
     pub or_latitude: bool,
-    /// Triads whose `[imu.prior]` has values that differ between axes, or biases that change sign with a reversed
+    /// Triads whose `[imu.prior]` contains values that differ between axes, or biases that change sign with a reversed
     /// column.
     pub prior_differs: Vec<Sensor>,
 }
@@ -161,7 +161,7 @@ fn made() -> NamedColumns {
     }
 }
 
-/// Triads whose prior would have to follow the columns.
+/// Triads whose prior must be rearranged together with the columns.
 pub fn prior_differs(run: &Run, orders: &PerSensor<AxisOrder>) -> Vec<Sensor> {
     let differs = |&sensor: &Sensor| {
         let order = orders.get(sensor);

@@ -39,14 +39,14 @@ pub fn unwritable(target: &Path, doing: &str, error: &io::Error) -> FileError {
 pub struct Unfinished(Receiver<Beside>);
 
 impl Unfinished {
-    /// Collects unfinished outputs from here on; `None` if another thread already does so.
+    /// Starts to collect unfinished outputs; `None` if another thread already does so.
     pub fn of_this_process() -> Option<Self> {
         let (announced, all) = channel();
         ANNOUNCED.set(announced).ok().map(|()| Self(all))
     }
 
     /// Removes the unfinished outputs, for a process that is about to end. Threads that start, finish or abandon an
-    /// output from here on wait for that end.
+    /// output after this call wait until the process ends.
     pub fn abandon(self) {
         ENDING.store(true, Ordering::SeqCst);
         for beside in self.0.try_iter() {

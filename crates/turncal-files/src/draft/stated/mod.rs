@@ -1,4 +1,4 @@
-//! Facts that a user states about a log in options.
+//! Facts about a log that a user states in options.
 
 mod kalibr;
 

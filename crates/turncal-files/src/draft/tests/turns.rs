@@ -109,7 +109,7 @@ fn without_a_time_turns_tell_the_unit_that_has_a_usual_rate() {
         &text,
         &[
             why,
-            "# no column rises steadily, as times do; the sample period is estimated from the turns",
+            "# no column increases steadily, as times do; the sample period is estimated from the turns",
         ],
     );
     let rate = text.split(why).nth(1).unwrap().split(' ').next().unwrap();
@@ -137,6 +137,6 @@ fn one_rough_turn_and_none_are_told_apart() {
     rows.truncate(500);
     has(
         &drafted(&rows),
-        &["# gyro_unit =  # TODO: too few usable turns of gravity to estimate it"],
+        &["# gyro_unit =  # TODO: there are too few usable turns to estimate it"],
     );
 }

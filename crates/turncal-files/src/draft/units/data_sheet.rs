@@ -1,4 +1,4 @@
-//! Sizes of counts, stated or measured.
+//! The size of a count, as stated or measured.
 
 use crate::draft::motion::TOLERANCE;
 use crate::draft::name::Unit;
@@ -24,7 +24,7 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// Size of a named unit that is a multiple of a unit of `run.toml`.
+    /// Size of a count for a named unit that is a multiple of a unit of `run.toml`.
     pub fn of_unit(sensor: Sensor, unit: Unit) -> Option<Self> {
         let of_one = unit_scale(sensor, unit.word).filter(|_| unit.times != 1.0)?;
         let times = rounded(unit.times, 4);
@@ -35,14 +35,14 @@ impl Scale {
         })
     }
 
-    /// Size from the magnitude at rest, in counts per g, if the zero is the nominal one.
+    /// Size of a count from the magnitude of gravity at rest, in counts per g, if the zero is nominal.
     pub fn of_gravity(per_g: f64) -> Self {
         let sheet = [2f64.powf(per_g.log2().round())];
         let by = "the magnitude of gravity at rest, if the zero offset is zero";
         Self::measured(per_g, ("g", STANDARD_GRAVITY), &sheet, by)
     }
 
-    /// Size from turns, in rows per rad: counts per rad/s, or per rad for increments.
+    /// Size of a count from turns: counts per rad/s or, for increments, counts per rad.
     pub fn of_turns(per_rad: f64, output: Output) -> Self {
         // The size of a pulse is specific to each instrument.
         let sheet = match output {

@@ -12,7 +12,7 @@ use turncal::calibration::{
 use turncal::imu::Sensor;
 use turncal_input::counted;
 
-/// An error: content found and content expected.
+/// An error, with the content found and the content expected.
 pub type Wrong = (String, String);
 /// Outcome of a check.
 pub type Checked = Result<(), Wrong>;

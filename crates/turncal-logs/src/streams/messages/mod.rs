@@ -1,4 +1,4 @@
-//! Topics of a log: each contains messages of one type with their log times.
+//! The topics of a log. Each topic contains messages of one type with their log times.
 
 pub mod json;
 pub mod packed;

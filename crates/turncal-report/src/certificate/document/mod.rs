@@ -1,4 +1,4 @@
-//! A calibration certificate: a document, and the content of every page margin.
+//! A calibration certificate: the document and the content of the page margins.
 
 mod results;
 
@@ -290,8 +290,8 @@ fn limits(conformity: &Conformity) -> Table {
     Table::new("Conformity with the specification", columns("parameter | value ± U | limits | unit | decision | risk"))
         .section(rows)
         .note(
-            "In the general installation form; U with the k of the results. Risk: probability, given this calibration, that the decision is wrong \
-             (false acceptance or false rejection; JCGM 106, 9.3).",
+            "Values are in the general installation form; U has the k of the results. Risk: probability, given this \
+             calibration, that the decision is wrong (false acceptance or false rejection; JCGM 106, 9.3).",
         )
 }
 
@@ -322,9 +322,9 @@ fn found(as_found: &AsFound) -> Table {
     });
     let columns = columns("parameter | as found ± U | as left ± U | change ± U | unit | change/U");
     Table::new("As found and as left", columns).section(rows).note(format!(
-        "As found: parameters from {}, valid when the item was received; as left: parameters from this calibration, in \
-         the general installation form. U of a change: root sum of squares of the two U. A change beyond its U \
-         shows that the item has drifted. Body frame of both: {}.",
+        "As found: parameters from {}, which were valid when the item was received. As left: parameters from this \
+         calibration. Both are in the general installation form. U of a change: root sum of squares of the two U. A \
+         change beyond its U shows that the item has drifted. Body frame of both: {}.",
         as_found.earlier,
         as_found.body_frame.words()
     ))

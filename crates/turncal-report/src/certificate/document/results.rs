@@ -5,7 +5,7 @@ use crate::prelude::*;
 use turncal::calibration::Group;
 use turncal::imu::{Sensor, Term};
 
-/// A value and its U rounded as required by EA-4/02, 6.3: U to two digits, the value to the same place.
+/// A value and its U, rounded as EA-4/02, 6.3, requires: U to two digits, and the value to the same decimal place.
 pub fn two_digits(of: f64, expanded: f64) -> (f64, f64) {
     let place = 10f64.powf((expanded.log10() - 1.0).floor());
     if place > 1.0 {
@@ -18,7 +18,7 @@ pub fn two_digits(of: f64, expanded: f64) -> (f64, f64) {
     }
 }
 
-/// Every parameter with its expanded uncertainty, and their definitions.
+/// Every parameter with its expanded uncertainty, and the definitions of both.
 pub fn results(certificate: &Certificate) -> Table {
     let has_budget = certificate.calibration.budget.is_some();
     let row = |of: &Measured| {
