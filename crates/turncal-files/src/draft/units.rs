@@ -28,7 +28,7 @@ pub struct Unit {
     pub why: String,
     /// Whether the unit is confirmed by motion or stated by the user.
     pub is_shown: bool,
-    /// Whether the rows are not whole numbers and fit no known unit.
+    /// Whether the rows fit no known unit, or another one than the file states.
     pub is_unfit: bool,
     /// Scale of counts, if determined.
     pub scale: Option<Scale>,
@@ -133,9 +133,13 @@ impl Quantities {
         if sensor == Sensor::Accel {
             self.hold(chosen.output, rows);
         }
+        // Gravity alone overrules a stated unit of accelerometers; turns need the clock as well.
+        let is_overruled =
+            sensor == Sensor::Gyro && by_name.is_some_and(|of| of.word != chosen.word);
         Unit {
             word: Some(chosen.word),
             is_shown: chosen.fits(),
+            is_unfit: is_overruled,
             ..Unit::open(&why)
         }
     }
