@@ -205,12 +205,13 @@ pub fn standing_time(sheet: &Sheet) -> Option<(&str, f64)> {
 
 /// The first column with the name of a time that falls from row to row.
 pub fn falling_time(sheet: &Sheet) -> Option<&str> {
-    let mut columns = sheet.names.iter().zip(&sheet.columns);
-    let falls = |(name, values): &(&String, &Vec<f64>)| {
-        let (_, back) = forward(values.iter().copied());
-        Name::of(name).is_time() > 1 && back >= FORWARD
+    let falls = |k: &usize| {
+        let is_text = sheet.units[*k] == "h:m:s";
+        let (_, back) = forward(sheet.columns[*k].iter().copied());
+        back >= FORWARD && (is_text || Name::of(&sheet.names[*k]).is_time() > 1)
     };
-    columns.find(falls).map(|(name, _)| name.as_str())
+    let column = (0..sheet.names.len()).find(falls)?;
+    Some(&sheet.names[column])
 }
 
 fn is_numeric(sheet: &Sheet, column: usize) -> bool {
@@ -276,6 +277,11 @@ fn forward(values: impl Iterator<Item = f64>) -> (f64, f64) {
     (forward / f64::max(steps, 1.0), back / f64::max(steps, 1.0))
 }
 
+/// Whether a column counts rows.
+fn counts(values: &[f64]) -> bool {
+    values.windows(2).all(|pair| pair[1] - pair[0] == 1.0)
+}
+
 /// The column whose name is most like a time, otherwise the first increasing column.
 fn time(sheet: &Sheet, names: &[Name], forward: impl Fn(usize) -> (f64, f64)) -> Option<usize> {
     let goes_on = |k: &usize| match forward(*k) {
@@ -289,7 +295,13 @@ fn time(sheet: &Sheet, names: &[Name], forward: impl Fn(usize) -> (f64, f64)) ->
         // Raw ticks rank after times that have a unit.
         let is_raw = names[*k].unit.is_some_and(|unit| unit.word == "count");
         let named = names[*k].is_time().saturating_sub(u8::from(is_raw));
-        (named, names[*k].is_of_time() && !is_text, names.len() - k)
+        let is_of_time = names[*k].is_of_time() && !is_text;
+        (
+            named,
+            is_of_time,
+            !counts(&sheet.columns[*k]),
+            names.len() - k,
+        )
     };
     let best = (0..names.len()).filter(goes_on).max_by_key(rank)?;
     // The angle of an integrating sensor and a rising temperature also increase steadily.

@@ -122,8 +122,12 @@ impl Name {
         let single = words.iter().position(is_axis).filter(|_| words.len() > 1);
         let axis = single.and_then(|place| words.remove(place).chars().next());
         let whole = words.concat();
+        // With the unit of a triad, an axis alone is enough.
+        let is_row = found.is_some_and(|unit| matches!(unit.of, Of::Rows(..)));
+        let alone = whole.chars().next().filter(|_| is_row && is_axis(&whole));
         let apart = match axis {
             Some(axis) => Some((&*whole, axis)),
+            None if alone.is_some() => alone.map(|axis| ("", axis)),
             None => axis_at_end(&whole).or(axis_at_start(&whole)),
         };
         Self {
@@ -141,13 +145,11 @@ impl Name {
         let names = |(_, parts, all): &&(Sensor, &[&str], &[&str])| {
             parts.iter().any(|part| self.stem.contains(part)) || all.contains(&&*self.stem)
         };
-        TRIADS
-            .iter()
-            .find(names)
-            .map(|(sensor, ..)| match self.unit.map(|unit| unit.of) {
-                Some(Of::Rows(of_unit, _)) => of_unit,
-                _ => *sensor,
-            })
+        let named = TRIADS.iter().find(names).map(|(sensor, ..)| *sensor);
+        match self.unit.map(|unit| unit.of) {
+            Some(Of::Rows(of_unit, _)) if named.is_some() || self.stem.is_empty() => Some(of_unit),
+            _ => named,
+        }
     }
 
     /// Whether the name belongs to neither a gyro nor an accelerometer.

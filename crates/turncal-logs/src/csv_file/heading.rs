@@ -154,7 +154,11 @@ impl Shape {
         }
         let most = shapes
             .into_iter()
-            .max_by_key(|((_, columns), (rows, numbers))| (*columns > 1, *rows, *numbers));
+            .max_by_key(|((delimiter, columns), (rows, numbers))| {
+                // Blanks may stand within a field, as in a date.
+                let is_byte = *delimiter != Delimiter::Blanks;
+                (*columns > 1, *rows, *numbers, is_byte)
+            });
         let ((delimiter, mut columns), _) = most?;
         let rows = rows.iter().filter_map(|row| row.fields(delimiter, columns));
         let rows: Vec<Vec<String>> = rows.collect();
@@ -340,6 +344,11 @@ impl Looks {
         if is_longer && own.is_none() {
             return self.unnamed(shape, first, tag.is_some());
         }
+        if own.is_none()
+            && let Some(named) = tag.and_then(|(tags, tag)| self.listed(tags, tag, columns))
+        {
+            return Ok(named);
+        }
         let Some(last) = own.or_else(|| (0..first).rfind(is_shared)) else {
             return self.unnamed(shape, first, tag.is_some());
         };
@@ -355,6 +364,29 @@ impl Looks {
             line: looks[begin].number,
             above: if tag.is_some() { 0 } else { last + 1 },
             cut: None,
+        })
+    }
+
+    /// The column names from a line that lists them behind the tag, as in logs that describe their own rows.
+    fn listed(&self, tags: &Tags, tag: &str, columns: usize) -> Option<Named> {
+        let is_word = |word: &String| word.starts_with(char::is_alphabetic);
+        self.0.iter().find_map(|look| {
+            let fields = look.fields.as_ref().ok()?;
+            let behind = fields.iter().position(|field| field == tag)? + 1;
+            let begin = (fields.len() + 1).checked_sub(columns)?;
+            let words = fields.get(begin.max(behind)..)?;
+            let is_list = tags.column == 0 && words.len() + 1 == columns;
+            let are_names = is_list && behind > 1 && words.iter().all(is_word);
+            are_names.then(|| Named {
+                names: std::iter::once(tag)
+                    .chain(words.iter().map(String::as_str))
+                    .map(str::to_owned)
+                    .collect(),
+                units: None,
+                line: look.number,
+                above: 0,
+                cut: None,
+            })
         })
     }
 

@@ -299,8 +299,9 @@ impl Labelled {
             return None;
         }
         order.retain(is_stream);
-        // Lines that each have a time are separate samples.
-        let are_parts = streams.filter(|kind| kind.has_time()).count() < 2;
+        // Lines of which most have a time are separate samples.
+        let timed = streams.clone().filter(|kind| kind.has_time()).count();
+        let are_parts = timed < 2 || 2 * timed < streams.count();
         let kind = |place: &usize| &kinds[*place];
         let streams = cycle(&order).filter(|_| are_parts);
         let streams = streams.map(|places| vec![places.iter().map(kind).collect()]);
