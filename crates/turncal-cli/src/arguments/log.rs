@@ -9,11 +9,11 @@ use turncal_files::draft::{Found, Stated, StatedUnit};
 use turncal_logs::DataFile;
 use turncal_report::terminal::printable;
 
-/// Statements about a log without a run.toml.
+/// Information about a log that has no run.toml.
 #[derive(Debug, Clone, PartialEq, Default, clap::Args)]
 #[command(next_help_heading = "For a log without run.toml")]
 pub struct OfLog {
-    /// File with the accelerometer rows, if the log contains only the gyros
+    /// File that contains the accelerometer rows, if the log contains only gyro data
     #[arg(long, value_name = "ACCEL.csv", conflicts_with = "stream")]
     accel_file: Option<PathBuf>,
     /// Rows per second
@@ -32,16 +32,17 @@ pub struct OfLog {
     /// deg, arcsec
     #[arg(long, value_name = "UNIT", value_parser = |text: &str| StatedUnit::parse(Sensor::Gyro, text))]
     gyro_unit: Option<StatedUnit>,
-    /// Unit of the accelerometers: m/s^2, g, or the size of one count, such as '1/16384 g'; for increments m/s, g*s
+    /// Unit of the accelerometers: m/s^2, g or the size of one count, such as '1/16384 g'; for increments m/s, g*s
     #[arg(long, value_name = "UNIT", value_parser = |text: &str| StatedUnit::parse(Sensor::Accel, text))]
     accel_unit: Option<StatedUnit>,
-    /// Sensor whose data sheet gives noise and tolerances: a name from turncal list, such as bmi088, or a TOML file
+    /// Sensor whose data sheet supplies the noise and tolerances: a name from turncal list, such as bmi088, or a TOML
+    /// file
     #[arg(long, value_name = "NAME")]
     sensor: Option<String>,
-    /// Kalibr imu.yaml that gives the noise figures and, unless --rate is given, the row rate
+    /// Kalibr imu.yaml that supplies the noise figures and, unless --rate is given, the sample rate
     #[arg(long, value_name = "YAML")]
     noise_file: Option<PathBuf>,
-    /// Stream of the instrument [default: the one with the most samples]
+    /// Stream that contains the instrument's data [default: the stream with the most samples]
     #[arg(long, value_name = "NAME")]
     stream: Option<String>,
 }

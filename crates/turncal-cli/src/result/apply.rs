@@ -23,10 +23,11 @@ const SUSPECT_SIGMAS: f64 = 10.0;
 /// Converts the raw samples of a run to angular rate and specific force
 ///
 /// Writes one row per sample: start and end in s, angular rate in rad/s and specific force in m/s², both averaged over
-/// the sample, along right, front and up in the body frame of the calibration. Also corrects the error terms of the
-/// calibration and, if the run has a temperature, the temperature dependence. The correction of the time offset
-/// neglects Earth rate. The last column is named after the verdict of the calibration, such as verdict_good, and
-/// contains the number one. The output can itself be the log of a run.toml: output = "rate", time_stamp = "end".
+/// the sample, along the right, forward and up axes of the body frame of the calibration. Also corrects the data for
+/// the error terms of the calibration and, if the run contains temperatures, for the temperature dependence. The
+/// correction for the time offset neglects Earth rate. The name of the last column states the verdict of the
+/// calibration, for example verdict_good; the column contains 1 in every row. You can use the output as the log of
+/// another run.toml with output = "rate" and time_stamp = "end".
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal apply result/calibration.json run.toml -o calibrated.csv.gz
@@ -43,11 +44,11 @@ pub struct Apply {
     /// File to write, `.csv` or `.csv.gz` [default: standard output]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Interpolate missing rows and mark them with 1 in a column `filled`, except in gaps that are too long for
-    /// calibrate to bridge
+    /// Interpolate missing rows and mark them with 1 in a column `filled`; gaps that are too long for calibrate to
+    /// bridge are not filled
     #[arg(long)]
     fill: bool,
-    /// Replace the output file if it exists, and apply a calibration even if its verdict is FAILED
+    /// Replace an existing output file, and apply a calibration even if its verdict is FAILED
     #[arg(long)]
     force: bool,
 }
