@@ -161,8 +161,8 @@ impl Report<'_> {
         let columns = columns.chain(Group::all().map(Group::short));
         let mut table = Table::new("σ without each move, divided by the σ with all moves", columns)
             .section(self.evaluation.without.iter().enumerate().map(row))
-            .note("A path without the move also lacks the dwell after it. Evaluate the shorter path before you use \
-                it.");
+            .note("A path without the move also lacks the dwell after it. Evaluate a shortened path before you use \
+            it.");
         table.optional = vec![2];
         table
     }

@@ -1,6 +1,6 @@
 //! Reduction of a part of a dwell, disturbed only by noise at rest, to whitened rows in the states at its beginning.
 //!
-//! At rest the parameters act through three constant rates and three constant specific forces. Given these and the
+//! At rest, the parameters act through three constant rates and three constant specific forces. Given these and the
 //! states at the beginning (together `g`), only noise remains. A filter of the moving states whitens this noise in each
 //! observation. The whitened observations and the states at the end are linear in `g`: together they contain all
 //! information of the part (Friedland 1969, "Treatment of bias in recursive filtering", IEEE Trans. Automatic Control

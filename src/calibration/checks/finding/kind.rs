@@ -195,7 +195,7 @@ kinds! {
         "The instrument slipped on the turntable; the misalignments apply to the mounting before the slip."
     TermNotShown = "W34" "term-not-shown" Note:
         "This recording cannot show an error term that instruments of this class may have, and K, E or D depend on the \
-         term. The σ include its usual size. Add the moves listed in the finding, or state that the instrument does \
+         term. The σ include the usual size of this term. Add the moves listed in the finding, or state that the instrument does \
          not have the term: sigma = 0 in [imu.terms]. `--with none` leaves out all terms."
         "U includes the usual size of error terms that the record cannot show."
 }
