@@ -75,7 +75,7 @@ impl Run {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Aiding {
-    /// Zero velocity in every dwell, and table attitude
+    /// Zero velocity in every dwell, and the attitude of the table
     Table,
     /// Zero velocity only; the accelerometers define the body axes
     Velocity,

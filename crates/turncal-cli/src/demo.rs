@@ -114,7 +114,8 @@ fn document(
     let (table_time, whole_time) = (minutes(run), minutes(still.run()));
     let closed_form = cut(still, table_time / whole_time)?;
     let note = format!(
-        "{}; first part of each dwell, equivalent to the {table_time:.0} min table time of the filter",
+        "{}; only the first part of each dwell, so that the total is equal to the {table_time:.0} min table time of \
+         the filter",
         note(&closed_form)
     );
     let methods = [
@@ -185,13 +186,14 @@ fn fly(run: &Run, estimates: &[&Estimate], truth: &PerSensor<Triad>) -> anyhow::
     let missions = [
         (
             "stationary and level",
-            "When stationary, gyro bias causes nearly all of the error, and only time at rest reduces its σ.",
+            "When the body is stationary, gyro bias causes nearly all of the error, and only time at rest reduces the \
+             σ of this bias.",
             still,
         ),
         (
             "in flight",
-            "In flight, turns and accelerations excite scale factors and misalignments, which the filter observes in \
-             minutes.",
+            "In flight, turns and accelerations bring in the scale factors and misalignments, which the filter \
+             observes within minutes.",
             flying,
         ),
     ];

@@ -49,8 +49,8 @@ impl Simulate {
         if simulated.geometry.rows_range(3..).amax() > 0.0 {
             tell!(
                 "note: the axes of the simulated table have errors (non-orthogonality, wobble, encoders) that the \
-                 quaternions in its log cannot show, so a calibration from these files will state misalignment σ \
-                 that are too small. turncal study accuracy estimates these errors."
+                 quaternions in the table log cannot show, so the misalignment σ of a calibration with these files \
+                 will be too small. turncal study accuracy estimates these errors."
             );
         }
         tell!(

@@ -68,7 +68,7 @@ impl Opened {
         show: impl FnOnce(&Draft),
     ) -> Result<Self, FileError> {
         let Some(file) = files.first() else {
-            let advice = "Give a log, or a run.toml with the files it refers to.";
+            let advice = "Give a log, or give a run.toml together with the files that it names.";
             return Err(FileError::of(Path::new(""), "no file", "a log", advice));
         };
         Self::of_file(file, files, (stream, stated), show)
@@ -112,9 +112,9 @@ impl Opened {
     ) -> Result<Self, FileError> {
         if is_toml(file) {
             if stream.is_some() || *stated != Stated::default() {
-                let found = "options that describe a log, given with a run.toml (rate, units, site, sensor, stream)";
-                let advice = "Write these statements into run.toml, or omit the options.";
-                let expected = "all statements in run.toml";
+                let found = "options that describe a log (rate, units, site, sensor, stream) together with a run.toml";
+                let advice = "Write this information into run.toml, or omit the options.";
+                let expected = "this information in run.toml";
                 return Err(FileError::of(file, found, expected, advice));
             }
             let run = match file.bytes().map(String::from_utf8_lossy) {

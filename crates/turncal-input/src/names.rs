@@ -36,7 +36,7 @@ pub fn find(all: &[String], taken: &[usize], name: &str) -> Result<usize, [Strin
                 .to_owned(),
         ]),
         [] => {
-            let advice = "Correct `columns` in run.toml or this header.";
+            let advice = "Correct `columns` in run.toml, or the names in this header.";
             Err([
                 format!("no column named `{}`", excerpt(name)),
                 format!("one of {}", choice(name, header())),

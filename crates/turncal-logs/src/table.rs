@@ -33,7 +33,7 @@ impl Table {
                 columns[other].len(),
                 names[other]
             );
-            let advice = "Give columns of the same rows.";
+            let advice = "Give columns with the same number of rows.";
             return Err(FileError::of(&name, found, "columns of one length", advice));
         }
         Ok(Self {

@@ -221,7 +221,7 @@ pub struct GravityRecord {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
-    /// Extended Kalman filter over the whole run
+    /// Extended Kalman filter that uses the whole run
     Ekf,
     /// Closed form from table positions, otherwise from labelled sections, otherwise from gravity
     SixPosition,

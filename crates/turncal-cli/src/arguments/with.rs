@@ -73,7 +73,7 @@ impl With {
 pub fn with_value() -> impl TypedValueParser<Value = With> {
     let words = [
         PossibleValue::new("auto")
-            .help("Every error term, as an average over its absence and its usual sizes"),
+            .help("Every error term, averaged over being absent and having its usual sizes"),
         PossibleValue::new("none").help("K, E and D alone"),
     ];
     let values = words.into_iter().chain(ErrorTerm::ALL.map(listed));

@@ -78,7 +78,7 @@ impl Follow<'_> {
             followed.evaluate(rows.received.bytes, &mut screen)?;
         }
         tell!(
-            "stopped following: {end}; the rows are in {}",
+            "stopped following because {end}; the rows are in {}",
             rows.log.display()
         );
         if let Some(text) = rows.left_out() {
@@ -97,8 +97,8 @@ impl Follow<'_> {
             && log.metadata().is_ok_and(|of| of.len() > 0)
         {
             bail!(
-                "{}: found the existing file {} in [imu], expected a new file for the rows. Give a new file there, or \
-                 follow the existing file",
+                "{}: found the existing file {} in [imu], expected a new file for the rows. Give the name of a new \
+                 file in [imu], or follow the existing file",
                 run.display(),
                 log.display()
             );

@@ -125,7 +125,7 @@ impl Incoming {
             if let Some(length) = cut.take() {
                 let log = self.log.display();
                 file.set_len(length).with_context(|| log.to_string())?;
-                tell!("{log}: removed the last line, which is incomplete");
+                tell!("{log}: removed the last line because it is incomplete");
             }
             let written = file.write_all(bytes);
             written.with_context(|| self.log.display().to_string())?;
@@ -199,7 +199,7 @@ fn read_in_background(source: PathBuf) -> anyhow::Result<Receiver<Option<Vec<u8>
                     return;
                 }
                 tell!(
-                    "{} has disappeared; waiting until it returns (Ctrl-C stops)",
+                    "{} has disappeared; waiting for its return (press Ctrl-C to stop)",
                     source.display()
                 );
             }

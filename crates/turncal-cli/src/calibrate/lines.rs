@@ -15,7 +15,7 @@ const MOST_HELD: usize = 64;
 const MOST_NAMED: usize = 5;
 
 /// Reason for omitting the first line of a device.
-const CUT: &str = "the line may be only the end of a row";
+const CUT: &str = "the first line may be only the end of a row";
 
 /// Holds back the first lines until several rows have the same layout; from then on, keeps only rows with this layout.
 #[derive(Default)]

@@ -171,13 +171,14 @@ impl Calibrate {
         let Some(opened) = self.of_log.open_positions(&self.runs)? else {
             drop(activity);
             tell!(
-                "note: the sensor is turned in these {count} logs, so they are taken as units of a lot (--lot)"
+                "note: the sensor was turned in these {count} logs, so turncal treats the logs as units of a lot \
+                 (--lot)"
             );
             return self.units();
         };
         tell!(
-            "note: the sensor lies still in each of these {count} logs, so they are taken as one recording of one \
-             sensor; for several sensors, add --lot"
+            "note: the sensor lies still in each of these {count} logs, so turncal treats the logs as one recording \
+             of one sensor; for several sensors, add --lot"
         );
         let runs: Vec<&Run> = opened.iter().map(|opened| &opened.run).collect();
         let together = Together {
@@ -194,9 +195,10 @@ impl Calibrate {
     /// The units of a lot.
     fn units(&self) -> anyhow::Result<()> {
         let message = if self.truth.is_some() {
-            "--truth applies to one run; to compare units of a lot with their truths, use turncal compare\n"
+            "--truth applies only to a single run; to compare the units of a lot with their true values, use turncal \
+             compare\n"
         } else if !self.require.is_empty() {
-            "--require applies to one run; for the units of a lot, use --specification\n"
+            "--require applies only to a single run; for the units of a lot, use --specification\n"
         } else {
             return self.lot();
         };
@@ -206,7 +208,8 @@ impl Calibrate {
     /// Follows a log until it ends, then calibrates it.
     fn followed(&self) -> anyhow::Result<()> {
         let [source] = self.runs.as_slice() else {
-            let message = "--follow takes one log; calibrate several logs when they are complete\n";
+            let message =
+                "--follow accepts only one log; calibrate several logs when they are complete\n";
             clap::Error::raw(ErrorKind::ArgumentConflict, message).exit();
         };
         let specification = self.specification.as_deref().map(models::specification);
@@ -479,7 +482,7 @@ pub fn read_truth(path: &Path, run: &Run, body_frame: BodyFrame) -> anyhow::Resu
         && *unit != run.instrument.unit
     {
         bail!(
-            "{}: the units are {} and {}, but the units of the run are {} and {}. Give the truth of this run",
+            "{}: the units are {} and {}, but the units of the run are {} and {}. Give the truth file of this run",
             path.display(),
             unit.gyro,
             unit.accel,

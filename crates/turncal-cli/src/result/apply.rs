@@ -64,7 +64,7 @@ impl Apply {
         let lost: usize = run.recording.imu.lost().iter().map(Range::len).sum();
         if let Some(missing) = run.recording.imu.missing().next().filter(|_| self.fill) {
             bail!(
-                "{}: {} rows are missing from {:.3} s on, too many to fill. Omit --fill, or split the log at this gap",
+                "{}: {} rows are missing from {:.3} s on, which is too many to interpolate. Omit --fill, or split the log at this gap",
                 self.run.display(),
                 missing.len(),
                 run.recording.imu.time(missing.start)
@@ -133,7 +133,8 @@ fn notes(record: &Calibration, correction: &Correction, run: &Run) -> Vec<String
     }
     if record.unit.is_none() {
         notes.push(
-            "the calibration states no units, so turncal assumed the units of the run".to_owned(),
+            "the calibration does not state units, so turncal assumed the units of the run"
+                .to_owned(),
         );
     }
     for sensor in Sensor::ALL {
@@ -146,8 +147,8 @@ fn notes(record: &Calibration, correction: &Correction, run: &Run) -> Vec<String
             .component_div(&run.instrument.prior.get(sensor).scale_sigma);
         if sigmas.max() > SUSPECT_SIGMAS {
             notes.push(format!(
-                "{} scale factors differ by up to {:.0} ppm from the nominal values of the run, {:.0} times the 1σ \
-                 in [imu.prior.{0}]. Check that this calibration belongs to this instrument",
+                "{} scale factors differ from the nominal values of the run by up to {:.0} ppm, which is {:.0} times \
+                 the 1σ in [imu.prior.{0}]. Check that this calibration belongs to this instrument",
                 sensor.name(),
                 off.amax() / PPM,
                 sigmas.max()
@@ -158,12 +159,14 @@ fn notes(record: &Calibration, correction: &Correction, run: &Run) -> Vec<String
         notes.extend(of_temperature(thermal, run));
     }
     if correction.has(Term::TimeOffset) {
-        notes
-            .push("the correction of the accelerometer time offset neglects Earth rate".to_owned());
+        notes.push(
+            "the correction for the accelerometer time offset neglects Earth rate".to_owned(),
+        );
     }
     if correction.has(Term::SizeEffect) && !run.recording.imu.continuous {
         notes.push(
-            "the recording is not continuous, so the size effect is corrected without its angular-acceleration part"
+            "the recording is not continuous, so the part of the size effect that depends on angular acceleration is \
+             not corrected"
                 .to_owned(),
         );
     }
@@ -185,8 +188,8 @@ fn of_temperature(thermal: &ThermalRecord, run: &Run) -> Vec<String> {
             || highest > range.highest + TEMPERATURE_TOLERANCE;
         is_beyond.then(|| {
             format!(
-                "{}: the run covers {lowest:.1} to {highest:.1} °C, but the calibration is valid for {:.1} to {:.1} \
-                 °C; for rows outside, the column in_range is 0",
+                "{}: the temperatures of the run are {lowest:.1} to {highest:.1} °C, but the calibration is valid \
+                 only from {:.1} to {:.1} °C; in rows outside this range, the column in_range is 0",
                 sensor.name(),
                 range.lowest,
                 range.highest

@@ -35,7 +35,8 @@ pub struct Compare {
 impl Compare {
     pub fn run(&self) -> anyhow::Result<()> {
         if self.calibrations.len() == 1 && self.truth.is_none() {
-            let message = "one calibration can be compared only with a truth; give --truth or a second calibration\n";
+            let message = "a single calibration can be compared only with a truth; give --truth or a second \
+            calibration\n";
             clap::Error::raw(ErrorKind::TooFewValues, message).exit();
         }
         let paths = self.truth.iter().chain(&self.calibrations);

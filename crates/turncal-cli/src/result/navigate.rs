@@ -159,7 +159,7 @@ impl Navigate {
         let of_run = calibration.provenance.as_ref();
         let of_run = of_run.and_then(|of| Some(of.latitude_deg? * DEGREE));
         let Some(latitude) = latitude.or(of_run) else {
-            bail!("no latitude: give --latitude-deg, or --trajectory");
+            bail!("the latitude is unknown: give --latitude-deg, or --trajectory");
         };
         let attitude = self.attitude_deg.0.map(|angle| angle * DEGREE);
         let height = self.height_m.unwrap_or(0.0);
@@ -175,7 +175,7 @@ fn attitude(text: &str) -> Result<Attitude, String> {
     let angles: Vec<&str> = text.split(',').collect();
     let [pitch, roll, heading] = angles[..] else {
         return Err(format!(
-            "found {}, expected pitch, roll and heading with commas between",
+            "found {}, expected pitch, roll and heading, separated by commas",
             turncal_input::counted(angles.len(), "number")
         ));
     };

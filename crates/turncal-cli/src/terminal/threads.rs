@@ -15,7 +15,9 @@ pub fn with_threads<T: Send>(work: impl FnOnce() -> T + Send) -> Result<T, Threa
         // thread and, if that fails, tries again at each allocation.
         Ok(_) => {}
         Err(_) => {
-            tell!("note: the system does not allow more threads; using one thread");
+            tell!(
+                "note: the operating system does not allow more threads, so turncal uses only one"
+            );
         }
     }
     let alone = ThreadPoolBuilder::new().num_threads(1).use_current_thread();

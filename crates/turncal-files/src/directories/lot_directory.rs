@@ -189,8 +189,8 @@ fn check_units(units: &Path, part: &Part) -> Result<(), FileError> {
     let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
     let others = names.filter(|name| !name.starts_with('.') && !held.contains(&name));
     others.min().map_or(Ok(()), |other| {
-        let found = format_args!("unit `{other}`, which is not among the given runs");
-        let advice = "Also give its run.toml, choose another directory, or add --force to restart.";
+        let found = format_args!("unit `{other}`, which is not among the runs of this command");
+        let advice = "Also give the run.toml of this unit, choose another directory, or add --force to restart.";
         Err(FileError::of(
             units,
             found,
@@ -206,7 +206,10 @@ fn read_unit(directory: &Path, key: Option<&str>) -> Result<(Unit, String), File
     let record: UnitRecord =
         small_file::json(&path, "a unit", FORMAT, "Calibrate the unit again.")?;
     let wrong = |found: &str| {
-        let (expected, advice) = ("the unit as turncal wrote it", "Calibrate it again.");
+        let (expected, advice) = (
+            "the unit.json file as turncal wrote it",
+            "Calibrate it again.",
+        );
         Err(FileError::of(directory, found, expected, advice))
     };
     if key.is_some_and(|key| record.key != key) {
@@ -216,7 +219,7 @@ fn read_unit(directory: &Path, key: Option<&str>) -> Result<(Unit, String), File
     let bytes = turncal_input::small_file::read(&path);
     let digest = bytes.ok().map(|bytes| digest_of_bytes(&bytes));
     if record.failure.is_none() && record.calibration_sha256 != digest {
-        return wrong("a calibration.json that does not belong to it");
+        return wrong("a calibration.json that belongs to another unit");
     }
     let calibrated = match record.failure {
         Some(failure) => Err(failure),

@@ -67,7 +67,7 @@ impl Parts {
         let parts = parts?;
         let Some((first, reference)) = parts.first() else {
             let (found, expected) = ("no part", "all parts of a job");
-            let advice = "Give the directories that --shard wrote.";
+            let advice = "Give the directories that were written with --shard.";
             return Err(FileError::of(Path::new("."), found, expected, advice));
         };
         for (directory, part) in &parts[1..] {
@@ -102,8 +102,8 @@ impl Parts {
             let (run, other) = (self.name(*run), other.display());
             let found = format_args!("run {run}, which is also in {other}");
             let (expected, advice) = (
-                "each run in one part only",
-                "Leave out one of the two parts.",
+                "each run in only one part",
+                "Leave out one of these two parts.",
             );
             return Err(FileError::of(directory, found, expected, advice));
         }
@@ -164,7 +164,9 @@ impl Parts {
                 FileError::of(&path, found, expected, advice)
             };
             if part.results.as_deref() != Some(digest_of_bytes(&bytes).as_str()) {
-                return Err(wrong("results that do not match their digest".to_owned()));
+                return Err(wrong(
+                    "results that do not match their SHA-256 digest".to_owned(),
+                ));
             }
             let runs: Vec<T> =
                 rmp_serde::from_slice(&bytes).map_err(|error| wrong(error.to_string()))?;

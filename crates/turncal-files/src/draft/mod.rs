@@ -39,7 +39,7 @@ use units::Quantities;
 /// Minimum number of samples at rest for a noise estimate.
 const FEWEST_AT_REST: usize = 64;
 
-const NO_COLUMNS: &str = "not recognised by name or values";
+const NO_COLUMNS: &str = "not recognised by their names or values";
 const AXES_OF_PROGRAM: &str = "axis convention of the program that wrote the log";
 
 /// Information about the instrument and its recording, found in a log.
@@ -339,7 +339,7 @@ fn standing_still(sheet: &Sheet, clock: &Clock) -> Option<[String; 3]> {
     Some([
         format!("{value} in all rows of the column `{name}`"),
         "times that increase".to_owned(),
-        "Log the time of each row, or set --rate.".to_owned(),
+        "Log the time of each row, or give the sample rate with --rate.".to_owned(),
     ])
 }
 

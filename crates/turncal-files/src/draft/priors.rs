@@ -97,7 +97,7 @@ impl Draft {
             Some(of) => format!("from the data sheet of {}", of.of),
             None => {
                 let class = class.name;
-                format!("typical value for {class} instrument; check it against the data sheet")
+                format!("typical value for {class} instrument; compare it with the data sheet")
             }
         };
         let table = format!("imu.prior.{}", sensor.name());
@@ -160,9 +160,9 @@ impl Draft {
 /// Meaning of a scale factor that the log does not show.
 fn open_scale(sensor: Sensor) -> &'static str {
     sensor.pick(
-        "counts per rad/s from the data sheet: 57.29578 times the counts per deg/s, which are often 131, 65.5, 32.8 or \
-         16.4; it could not be estimated from the change of gravity direction",
-        "counts per m/s² from the data sheet: counts per g divided by 9.80665; it could not be estimated from gravity at \
-         rest",
+        "counts per rad/s from the data sheet: 57.29578 times the counts per deg/s, which are often 131, 65.5, 32.8 \
+         or 16.4; turncal could not estimate this value from the change of gravity direction",
+        "counts per m/s² from the data sheet: counts per g divided by 9.80665; turncal could not estimate this value \
+         from gravity at rest",
     )
 }

@@ -68,7 +68,7 @@ impl Rates<'_> {
         let of_turns = |[found, stated, _]: [String; 3]| {
             let turned = rounded(shown.recip(), 3);
             [
-                format!("{found}, and turns that fit the unit of the gyros at {turned} Hz"),
+                format!("{found}, and turns that fit the unit of the gyros only at {turned} Hz"),
                 stated,
                 "Correct --rate, or state the unit of the gyros with --gyro-unit.".to_owned(),
             ]
@@ -113,7 +113,7 @@ impl Rates<'_> {
         let times = rounded(shown * rate, 3);
         Some([
             format!(
-                "turns that fit the unit of the gyros only at {turned} Hz, at which a row lasts {times} times as long"
+                "turns that fit the unit of the gyros only at {turned} Hz, so that a row lasts {times} times as long"
             ),
             format!("{rate} Hz, as stated"),
             format!("State --rate {turned}, or the unit of the gyros with --gyro-unit."),
@@ -129,8 +129,8 @@ impl Rates<'_> {
             Some((written, of_stamps)) => Clock {
                 certainty: Certainty::Guess,
                 doubt: Some(format!(
-                    "The preamble of the log states {written} Hz, its time stamps {} Hz, and no turn shows which of \
-                     them is right. turncal used the time stamps. State --rate.",
+                    "The preamble of the log states {written} Hz and its time stamps {} Hz; no turn shows which of \
+                     the two rates is right. turncal used the time stamps. State --rate.",
                     rounded(of_stamps, 4)
                 )),
                 ..clock

@@ -218,8 +218,7 @@ impl Streams {
             {
                 std::mem::swap(&mut imu.file, other);
             }
-            let why =
-                "accelerometers use their own clock; --with time-offset estimates the difference";
+            let why = "the accelerometers have their own clock; --with time-offset estimates the difference";
             remarks.reason("imu.accel_from", why);
         }
         for remark in &self.remarks {
@@ -228,7 +227,8 @@ impl Streams {
         if let Some(damage) = self.damage.as_ref().filter(|_| self.written.is_none()) {
             let damage = one_line(&damage.to_string());
             imu.salvage = Some(true);
-            let why = format_args!("uncomment this line to use the intact part. {damage}");
+            let why =
+                format_args!("uncomment this line to use the intact part of the file. {damage}");
             remarks.open("imu.salvage", why);
         }
     }

@@ -221,7 +221,7 @@ fn registers_without_names_and_time_are_told_by_their_numbers() {
         &text,
         &[
             "columns = { gyro = [\"4\", \"5\", \"6\"], accel = [\"1\", \"2\", \"3\"] }",
-            "# TODO: no column increases steadily, as times do",
+            "# TODO: no column increases steadily, as a time does",
         ],
     );
 }

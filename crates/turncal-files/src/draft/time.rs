@@ -67,7 +67,7 @@ impl Clock {
     pub fn find(sheet: &Sheet, columns: &mut Columns) -> Self {
         let stated = sheet.rate.map(f64::recip);
         let Some((column, stamps)) = columns.time.zip(columns.stamps(sheet)) else {
-            return Self::without(stated, "no column increases steadily, as times do");
+            return Self::without(stated, "no column increases steadily, as a time does");
         };
         let steps = Steps::of(&stamps);
         let name = Name::of_column(&sheet.names[column], &sheet.units[column]);
@@ -159,8 +159,8 @@ impl Clock {
             .filter(|_| self.unit != "count")
             .map(|step| rounded(period / step, 7));
         let doubt = format!(
-            "The clock of the log is doubtful: turns fit the unit of the gyros only if a row lasts {times} times as \
-             long as at {former} Hz ({}; {}). turncal used {rate} Hz{}. State --rate, or --gyro-unit if the unit is \
+            "The clock of the log is doubtful: the turns fit the unit of the gyros only if a row lasts {times} times \
+             as long as at {former} Hz ({}; {}). turncal used {rate} Hz{}. State --rate, or --gyro-unit if the unit is \
              wrong.",
             self.unit,
             self.why,

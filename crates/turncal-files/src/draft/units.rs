@@ -59,7 +59,9 @@ impl Quantities {
         Self {
             output: Output::Rate,
             output_why: "as in most logs".to_owned(),
-            units: PerSensor::from_fn(|_| Unit::open("there are too few numeric rows to decide")),
+            units: PerSensor::from_fn(|_| {
+                Unit::open("there are too few numeric rows to determine the units")
+            }),
             opposed: false,
         }
     }
@@ -145,7 +147,7 @@ impl Quantities {
         self.output = output;
         self.output_why = match output {
             Output::Pulse => {
-                "the values are integer counts, and the remainder of each is carried into the next row, as in pulse \
+                "the values are whole counts, and the remainder of each row is carried into the next, as in pulse \
                  outputs"
                     .into()
             }
@@ -154,7 +156,7 @@ impl Quantities {
                 format!("the specific force at rest is g times {period} s per row")
             }
             Output::Rate => {
-                "the specific force at rest is g itself, not g times the sample period".into()
+                "the specific force at rest is g, not g times the sample period".into()
             }
         };
     }
@@ -215,9 +217,9 @@ impl Quantities {
             }
             None if is_bare && self.output != Output::Pulse => {
                 return Unit::open(if rows.motion.is_turned {
-                    "there are too few usable turns to estimate it"
+                    "there are too few usable turns to estimate the unit"
                 } else {
-                    "the gravity direction does not change, so it cannot be estimated"
+                    "the gravity direction does not change, so the unit cannot be estimated"
                 });
             }
             _ => {}
@@ -363,7 +365,9 @@ fn why_count(rows: &TriadRows, unfit: &str) -> String {
         _ if rows.whole => "whole numbers".to_owned(),
         Some(unit) => {
             let unit = unit.word;
-            format!("{unit} is not a built-in unit, so it is a count with a scale")
+            format!(
+                "{unit} is not a built-in unit, so turncal treats it as a count with this scale"
+            )
         }
         None => unfit.to_owned(),
     }

@@ -81,8 +81,8 @@ impl Residual {
             ),
         };
         format!(
-            "{name}: the residual error is up to {:.1} ppm in scale and {:.1} arcsec in misalignment ({example} in any \
-             direction combined), and {bias} in bias",
+            "{name}: the remaining error is up to {:.1} ppm in scale, {:.1} arcsec in misalignment ({example} if both \
+             are combined in any direction), and {bias} in bias",
             scale / PPM,
             across.amax() / ARCSEC
         )

@@ -8,7 +8,7 @@ use turncal::imu::{AxisOrder, PerSensor, Sensor, Term};
 use turncal::run::Aiding;
 
 /// A part of the calibration that nearly every format omits.
-pub const SIGMA: &str = "sigma and covariance of the parameters; they are in calibration.json";
+pub const SIGMA: &str = "sigma and covariance of the parameters; both are in calibration.json";
 
 /// A calibration in a format.
 #[derive(Debug, Clone, PartialEq)]
@@ -97,7 +97,9 @@ impl<'a> Remarks<'a> {
         let terms: Vec<&str> = terms.into_iter().map(Term::name).collect();
         let note = (!terms.is_empty()).then(|| {
             let terms = terms.join(", ");
-            format!("this format does not correct error terms ({terms}); `turncal apply` does")
+            format!(
+                "this format does not contain error terms ({terms}); `turncal apply` corrects them"
+            )
         });
         self.omissions.iter().cloned().chain(note).collect()
     }
@@ -130,7 +132,7 @@ pub fn title(record: &Calibration) -> String {
     let method = match (record.method, record.aiding) {
         (Some(Method::Ekf), Some(Aiding::Table)) => "Kalman filter, standstill and table attitude",
         (Some(Method::Ekf), _) => "Kalman filter, standstill only",
-        (Some(Method::SixPosition), _) => "closed form from static positions",
+        (Some(Method::SixPosition), _) => "closed form with static positions",
         (None, _) => "not stated",
     };
     let mut parts = vec![
@@ -158,8 +160,8 @@ pub fn equation(values: &Values) -> [String; 2] {
             gyro.join(", "),
             accel.join(", ")
         ),
-        None => "axes of N and u: right, front, up; (y, x, -z) converts a log along front, right, down and (y, -x, z) \
-                 one along front, left, up"
+        None => "axes of N and u: right, front, up; (y, x, -z) converts values along front, right, down, and (y, -x, \
+        z) converts values along front, left, up"
             .to_owned(),
     };
     [

@@ -108,7 +108,7 @@ impl<'a> Reading<'a> {
         let lacking = (self.lacking > 0).then(|| {
             let rows = counted(self.lacking, "row");
             format!(
-                "turncal counts {rows} of {file} without a gyro or accelerometer value as missing."
+                "turncal counts {rows} of {file} with a missing gyro or accelerometer value as missing."
             )
         });
         [blank, lacking].into_iter().flatten()
@@ -125,7 +125,7 @@ impl<'a> Reading<'a> {
             0 => (String::new(), "Record a run with dwells and turns."),
             lacking => (
                 format!(
-                    " and {} without a gyro or accelerometer value",
+                    " and {} with a missing gyro or accelerometer value",
                     counted(lacking, "row")
                 ),
                 "If gyros and accelerometers are in separate rows, `turncal init` drafts a run.toml for that layout.",

@@ -116,7 +116,7 @@ fn apart(file: &Path, gyro: &Track, accel: &Track) -> FileError {
         format!("{first} s to {} s", first + last * period)
     };
     let found = format!("an accelerometer stream from {}", of(accel));
-    let expected = format!("times that overlap the gyro stream ({})", of(gyro));
+    let expected = format!("times that overlap those of the gyro stream ({})", of(gyro));
     let advice = "Convert both streams to the same clock, or correct time_unit.";
     FileError::of(file, found, expected, advice)
 }
@@ -130,7 +130,7 @@ fn remarks_of_both(gyro: Track, accel: Track) -> Vec<String> {
     remarks.extend(uneven.map(|said| format!("Accelerometers: {said}")));
     remarks.push(format!(
         "Gyros (every {} s) and accelerometers (every {} s) are separate streams, so turncal integrated the \
-         accelerometers over the gyro samples. If their clocks may differ, estimate the offset with --with \
+         accelerometers over the gyro samples. If the two clocks may differ, estimate the offset with --with \
          time-offset.",
         rounded(gyro.clock.period, 7),
         rounded(accel.clock.period, 7)

@@ -185,7 +185,7 @@ impl Channel {
             let (name, largest) = (&self.name, LARGEST);
             notes.push(format!(
                 "{file}, line {line}, column {name}: found {value}, expected a temperature within ±{largest} °C. \
-                 turncal ignored the column. If it is in kelvin or fahrenheit, set temperature_unit = \"K\" or \
+                 turncal ignored the column. If the unit is kelvin or fahrenheit, set temperature_unit = \"K\" or \
                  \"degF\" in [imu]."
             ));
         }
@@ -193,8 +193,8 @@ impl Channel {
         if missing > 0 {
             let name = &self.name;
             notes.push(format!(
-                "{file}, column {name}: no temperature in {}, the first in line {line}. turncal interpolated the \
-                 temperature there.",
+                "{file}, column {name}: the temperature is missing in {}, first in line {line}. turncal interpolated \
+                 the missing temperatures.",
                 counted(missing, "row")
             ));
         }

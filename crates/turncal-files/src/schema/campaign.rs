@@ -145,7 +145,10 @@ pub fn campaign_text(paths: &[String], day_to_day: &DayToDay) -> String {
         day_to_day: differing.map(rounded_sigma).collect(),
     };
     let mut remarks = Remarks::default();
-    remarks.before("day_to_day", "1σ from one recording to the next");
+    remarks.before(
+        "day_to_day",
+        "1σ of the difference from one recording to the next",
+    );
     page::text(FORMAT, &file, &remarks)
 }
 

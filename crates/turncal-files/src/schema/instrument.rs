@@ -78,7 +78,7 @@ impl<'a> Fields<'a> {
         let accel_from = self.accel_from(&source, of_gyro)?;
         if let (Some(of), Some(_)) = (&imu.instance, &accel_from) {
             let meaning = format!(
-                "a stream of one instrument without `{}`, which accel_from requires",
+                "a stream that contains only one instrument, without `{}`, because accel_from is given",
                 of.column
             );
             return Err(self.document.missing("imu.stream", &meaning));
@@ -133,8 +133,8 @@ impl<'a> Fields<'a> {
             return Ok(false);
         }
         if self.run.imu.output != Output::Rate || self.run.turntable.is_some() {
-            let meaning = "a column name (pulses, increments and runs with a [turntable] need either this or \
-                sample_period_s)";
+            let meaning = "a column name (pulses, increments and runs with a [turntable] need either a time column or \
+            sample_period_s)";
             return Err(self.document.missing("imu.columns.time", meaning));
         }
         clock.period = Some(USUAL_PERIOD);
@@ -219,7 +219,8 @@ impl<'a> Fields<'a> {
             let path = format!("imu.columns.{name}");
             return Err(self.document.missing(&path, "the names of three columns"));
         }
-        let note = format!("The log has no {name} columns. turncal assumed zero output.");
+        let note =
+            format!("The log has no {name} columns. turncal assumed that their output is zero.");
         self.notes.push(note);
         Ok("count".to_owned())
     }
@@ -257,7 +258,7 @@ impl<'a> Fields<'a> {
             }
             (Some(scale), Some(of_unit)) if !is_near(&scale, of_unit) => {
                 let expected = format_args!("about {of_unit} (1 rad/s or 1 m/s² in this unit)");
-                let advice = "Correct the scale or the unit, or remove the scale.";
+                let advice = "Correct the scale or the unit, or omit the scale.";
                 Err(document.wrong(&path, expected, advice))
             }
             (Some(scale), _) => Ok(scale),
@@ -300,7 +301,7 @@ impl<'a> Fields<'a> {
         let [scale_sigma, installation_sigma, bias_sigma] = sigma;
         if !assumed.is_empty() && of.columns.is_some() {
             self.notes.push(format!(
-                "[imu.prior.{}] in run.toml is incomplete. turncal assumed (1σ): {}.",
+                "The fields of [imu.prior.{}] in run.toml are incomplete. turncal assumed (1σ): {}.",
                 sensor.name(),
                 assumed.join(", ")
             ));

@@ -170,7 +170,7 @@ fn check_values(document: Document, file: &Laboratory) -> Result<(), FileError> 
         };
         if !of.is_none_or(is_sound) {
             let expected =
-                format_args!("a value from {low} to {high} and an uncertainty of at least zero");
+                format_args!("a value from {low} to {high}, and an uncertainty of at least zero");
             let path = format!("conditions.{name}");
             return Err(document.wrong(&path, expected, "Correct this value."));
         }

@@ -185,16 +185,17 @@ impl InstrumentFields<'_> {
         }
         if imu.is_of_means() {
             notes.push(format!(
-                "The rows are the means of {} positions, and their noise is not known. turncal assumed {}, the noise \
-                 of a MEMS sensor averaged over one second. If you know the noise, state \
+                "The rows are the means of {} positions, whose noise is unknown. turncal assumed {}, the noise of a \
+                 MEMS sensor averaged over one second. If you know the noise, state \
                  velocity_random_walk_ug_per_sqrt_hz for rows of one second.",
                 imu.len(),
                 found.join(", ")
             ));
         } else if !found.is_empty() {
             notes.push(format!(
-                "You stated no white noise. turncal starts from the noise of the quieter part of the recording ({}) \
-                 and estimates it from there. If you know the data-sheet values, state them in [imu.noise].",
+                "run.toml states no white noise. turncal starts with the noise of the quieter part of the recording \
+                 ({}) and improves this estimate. If you know the values of the data sheet, state them in \
+                 [imu.noise].",
                 found.join(", ")
             ));
         }
@@ -212,7 +213,7 @@ impl InstrumentFields<'_> {
         let Some(period) = angle.filter(|&period| period > 0.0) else {
             return Err(FileError::of(
                 &self.log.source.file,
-                "rows without time stamps, and no turns from which the sample period can be estimated",
+                "rows without time stamps, and no turns with which to estimate the sample period",
                 "a time column or sample_period_s in run.toml",
                 "State sample_period_s (--rate).",
             ));
@@ -247,12 +248,12 @@ impl InstrumentFields<'_> {
         } else {
             (
                 "beyond",
-                " If the instrument clock is right and the time stamps are wrong, omit the time column.",
+                " If the clock of the instrument is right and the time stamps are wrong, omit the time column.",
             )
         };
         Some(format!(
-            "The time stamps are {period} s apart, {ppm:.2} ppm {way} than sample_period_s. turncal used the time \
-             stamps; this changes the scale factor of the {triad} by the same amount, {judged} its prior σ of \
+            "The time stamps are {period} s apart, which is {ppm:.2} ppm {way} than sample_period_s. turncal used the \
+             time stamps; this changes the scale factor of the {triad} by the same amount, {judged} its prior σ of \
              {sigma:.2} ppm.{advice}"
         ))
     }
@@ -276,8 +277,7 @@ impl Fields<'_> {
     fn site(&mut self) -> Result<Site, FileError> {
         let file = &self.run.site;
         if file.latitude_deg.is_none() && self.run.turntable.is_some() {
-            let meaning =
-                "the latitude (north positive), because a [turntable] run needs a known Earth rate";
+            let meaning = "the latitude (north positive), because Earth rate must be known for a run with a [turntable]";
             return Err(self.document.missing("site.latitude_deg", meaning));
         }
         let longitude = file.longitude_deg.map_or(0.0, |degrees| degrees.0 * DEGREE);

@@ -75,7 +75,7 @@ impl Input {
         if count > self.left() {
             let found = match self.left() {
                 0 => "the end of the file".to_owned(),
-                left => format!("only {left} bytes before the end of the file"),
+                left => format!("only {left} bytes left before the end of the file"),
             };
             return Err(Broken::new(
                 self.offset,

@@ -47,9 +47,9 @@ pub fn figure(quality: &Quality) -> Plot {
         panels,
     )
     .caption(
-        "|f| − gravity: deviation of the mean specific force of each dwell from gravity. Direction: angle after each \
-         move between the vertical that the gyros carried over from the previous dwell and the vertical that the \
+        "|f| − gravity: deviation of the mean specific force of each dwell from gravity. Direction: after each move, \
+         the angle between the vertical that the gyros carried over from the previous dwell and the vertical that the \
          accelerometers measured. Crosses: the instrument with nominal parameters, before calibration. Dots: the \
-         calibrated instrument. Rings: the instrument calibrated without this dwell.",
+         calibrated instrument. Rings: the instrument calibrated without the data of this dwell.",
     )
 }

@@ -79,7 +79,7 @@ pub fn note(closed_form: &ClosedForm) -> String {
         }
         Reference::Labels => format!("{accel} labelled positions and {turns} labelled turns"),
         Reference::Gravity => {
-            format!("gravity in {accel} dwells and its direction change over {turns} turns")
+            format!("gravity in {accel} dwells and the change of its direction over {turns} turns")
         }
         Reference::GravityAlone => format!("the magnitude of gravity in {accel} dwells"),
     };

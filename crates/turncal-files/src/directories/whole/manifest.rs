@@ -12,7 +12,7 @@ use turncal_input::small_file;
 pub const FILE: &str = ".turncal";
 
 const FIRST_LINE: &str = "turncal-output/1: turncal wrote the files listed here; --force replaces this directory only \
-                          if it contains no other files";
+if it contains no files other than these";
 
 /// The list of all entries of a directory.
 pub fn of_all(directory: &Path) -> io::Result<String> {

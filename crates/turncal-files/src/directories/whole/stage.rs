@@ -166,7 +166,7 @@ impl Stage {
         };
         if exists && fs::rename(&old, &self.target).is_err() {
             let stage = self.beside.stage.display();
-            let doing = format!("put the output in place (the old output is in {stage})");
+            let doing = format!("put the output in its place (the old output is in {stage})");
             let advice = "Move it back by hand.";
             return Err(FileError::io(&self.target, &doing, &error, advice));
         }

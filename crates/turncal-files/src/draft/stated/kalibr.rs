@@ -27,7 +27,7 @@ impl KalibrImu {
     /// # Errors
     /// [`FileError`] if the file cannot be read, lacks a noise density, or states a wrong number or a key twice.
     pub fn read(path: &Path) -> Result<Self, FileError> {
-        let advice = "Correct the name or add the file.";
+        let advice = "Correct the name, or create the file.";
         let text = small_file::text(path, "the noise figures", advice)?;
         Self::of_text(path, &text)
     }

@@ -137,6 +137,6 @@ fn one_rough_turn_and_none_are_told_apart() {
     rows.truncate(500);
     has(
         &drafted(&rows),
-        &["# gyro_unit =  # TODO: there are too few usable turns to estimate it"],
+        &["# gyro_unit =  # TODO: there are too few usable turns to estimate the unit"],
     );
 }

@@ -78,7 +78,9 @@ impl Hypothesis {
         };
         match (sensor, self.fits()) {
             (Sensor::Accel, true) => format!("{} at rest", rounded(motion.gravity, 4)),
-            (Sensor::Accel, false) => format!("the magnitude at rest is {factor} times gravity"),
+            (Sensor::Accel, false) => {
+                format!("the magnitude of the specific force at rest is {factor} times gravity")
+            }
             (Sensor::Gyro, true) => {
                 "integrated gyro angles match the change of gravity direction".to_owned()
             }
