@@ -217,7 +217,8 @@ fn usable<'a>(
     }
     match (calibrated.calibration.unit.as_ref(), output) {
         (Some(own), Some(common)) if own != common => Err(format!(
-            "outputs are `{}` and `{}`, but most calibrations have `{}` and `{}`. Give calibrations in one unit",
+            "the outputs are in `{}` and `{}`, but most calibrations have outputs in `{}` and `{}`. Give calibrations \
+             with the same units",
             own.gyro, own.accel, common.gyro, common.accel
         )),
         _ => Ok(calibrated),

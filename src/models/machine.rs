@@ -67,7 +67,7 @@ pub fn path(
         }
         _ => {
             return Err(text.inconsistent(
-                "expected either [axes] or [body], depending on the axes that the path turns about",
+                "expected either [axes] or [body], depending on which axes the path turns about",
             ));
         }
     };

@@ -58,7 +58,7 @@ fn known(labels: &[String]) -> String {
     let mut quoted: Vec<String> = labels.iter().map(|label| format!("`{label}`")).collect();
     quoted.dedup();
     match quoted.join(", ").as_str() {
-        "" => "the run has no [segments]; omit --segment, or add them to run.toml".to_owned(),
+        "" => "the run has no [segments]; omit --segment, or add [segments] to run.toml".to_owned(),
         quoted => format!("known labels are {quoted}"),
     }
 }

@@ -87,8 +87,9 @@ impl Line {
             ),
         };
         format!(
-            "The gyros turn {:.3} ± {:.3} s {way} than the table in all {moves} moves{drift}. turncal converted the \
-             times of the table log to the clock of the IMU. To avoid this step, convert both logs to the same clock.",
+            "In all {moves} moves, the gyros turn {:.3} ± {:.3} s {way} than the table{drift}. turncal converted the \
+             times of the table log to the clock of the IMU. To avoid this conversion, use the same clock in both \
+             logs.",
             offset.abs(),
             self.offset[1],
         )

@@ -237,7 +237,7 @@ impl Scenario {
             let number = duration * rate;
             if !(2.0..=MOST_SAMPLES).contains(&number) {
                 return Err(format!(
-                    "{duration:.1} s of path {} at {rate} Hz give {number:.3e} {what}, expected 2 to \
+                    "{duration:.1} s of path {} at {rate} Hz require {number:.3e} {what}, expected 2 to \
                      {MOST_SAMPLES:.0e}",
                     self.path_name
                 ));

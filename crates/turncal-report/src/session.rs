@@ -193,7 +193,7 @@ pub fn notes(run: &Run, status: &Status) -> Vec<String> {
 }
 
 /// Upward directions seen from above the sensor, in three layers of nine directions (z up, level, down); then the turns
-/// in both directions about each axis.
+/// both ways about each axis.
 fn coverage(status: &Status) -> Vec<String> {
     let mark = |done: bool| if done { '●' } else { '○' };
     let rests = status.survey.rests.iter();

@@ -108,17 +108,17 @@ type Squares = fn(&[&Innovation]) -> Vec<f64>;
 /// Innovations that are tested separately: text that follows the kind of observation, the causes to check if the
 /// innovations are large, and their squares.
 const LOOKS: [(&str, &str, &str, Squares); 3] = [
-    ("all", "", "the white noise in [imu.noise]", of_all),
+    ("all", "", "the white noise figures in [imu.noise]", of_all),
     (
         AFTER_MOVES,
         " first after each move",
-        "the noise of moves and of the table position, the time stamps and --with time-offset",
+        "the noise of moves, the table position, the time stamps and --with time-offset",
         after_moves,
     ),
     (
         "over-dwells",
         " summed over each dwell",
-        "the bias variation in [imu.noise], or add --temperature if biases follow the temperature",
+        "the bias variation in [imu.noise]; if the biases follow the temperature, add --temperature",
         over_dwells,
     ),
 ];
@@ -188,7 +188,8 @@ pub fn inconsistent(innovations: &[Innovation], pulses: &[Observation]) -> Optio
         }
     }
     let text = format!(
-        "The residuals do not have the size that their σ predict. Relative to the predicted size, they are: {}. Check \
+        "The size of the residuals does not agree with their predicted σ. Relative to the predicted size, the \
+         residuals are: {}. Check \
          {}.",
         each.join("; "),
         causes.join("; ")

@@ -27,8 +27,8 @@ pub fn contradicted(contradicted: &[LabelCheck]) -> Option<Finding> {
 /// The finding on labelled sections with missing parts, if any.
 pub fn lost(labels: &[String]) -> Option<Finding> {
     let text = format!(
-        "Part of a labelled section is missing from the log, so turncal skipped section {}. Record the section again, \
-         or remove it from [segments].",
+        "Some rows of a labelled section are missing from the log, so turncal skipped section {}. Record this section \
+         again, or remove its label from [segments].",
         labels.join(", ")
     );
     let figures = json!({ "labels": labels });

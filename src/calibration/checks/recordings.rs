@@ -52,8 +52,8 @@ pub fn recordings_differ(differences: &[RecordingDifference]) -> Option<Finding>
     let each: Vec<String> = differences.iter().map(one).collect();
     let text = format!(
         "The recordings differ by more than their σ and [day_to_day] allow. turncal estimated the difference ({}) and \
-         included it in the σ. Usual causes: bias changes at switch-on, remounting (set mounting_arcsec), or a \
-         temperature sensor away from the inertial sensors.",
+         included it in the σ. The usual causes are bias changes at switch-on, remounting (set mounting_arcsec), and \
+         a temperature sensor that is not close to the inertial sensors.",
         each.join(", ")
     );
     let figures = json!({ "differences": differences });

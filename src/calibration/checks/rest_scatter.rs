@@ -83,8 +83,9 @@ fn of_triad<'a>(
         Sensor::Accel => "µg/√Hz",
     };
     let text = format!(
-        "{} noise at rest is {compared} the stated value: {} instead of {} {symbol} (tolerance −{:.1} % to +{:.1} %). \
-         The estimate uses 0.1 s averages, so vibration of the mount raises the result too. Run turncal allan on a \
+        "The {} noise at rest is {compared} the stated value: {} instead of {} {symbol} (tolerance −{:.1} % to +{:.1} \
+         %). \
+         The noise is estimated from 0.1 s averages, so vibration of the mount increases the result. Run turncal allan on a \
          long static recording to separate noise from vibration, and correct {figure}.",
         triad_name(sensor),
         shown,

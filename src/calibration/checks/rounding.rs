@@ -49,8 +49,8 @@ pub fn rounded(
         };
         let step = steps.fold(0.0, f64::max) / value;
         let text = format!(
-            "{} values are rounded to {} {unit}, coarser than their noise, so averaging cannot recover their \
-             position within a step. turncal widened the σ {}. Log more digits.",
+            "{} values are rounded to {} {unit}, which is coarser than their noise, so averaging cannot recover the \
+             mean within a step. turncal widened the σ {}. Log more digits.",
             triad_name(sensor),
             three_digits(step),
             widened_by(growth)

@@ -179,8 +179,8 @@ fn noise_learnt(
     let tables: Vec<String> = tables.collect();
     let lines: Vec<&String> = lines.iter().map(|(_, line)| line).collect();
     let text = format!(
-        "Noise is larger than stated: {} (squared distance {ratio:.0}; limit {limit:.0}). turncal used its own \
-         estimate, which is included in every σ. To use this estimate for the next recording, state {}.",
+        "The noise is larger than stated: {} (squared distance {ratio:.0}; limit {limit:.0}). turncal used its own \
+         estimate, which every σ includes. To use this estimate for the next recording, state {}.",
         words.join("; "),
         tables.join("; ")
     );

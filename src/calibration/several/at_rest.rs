@@ -250,7 +250,7 @@ fn not_turned(model: &Model) -> impl Iterator<Item = Finding> {
         of.filter_map(|index| parameter_name(model.form, index))
             .collect()
     };
-    let by = "a recording at rest in one attitude";
+    let by = "only a recording at rest in one attitude";
     let hidden = names(&|sensor, is_bias| !is_bias || sensor == Sensor::Accel);
     let turned = names(&|_, is_bias| !is_bias);
     let findings = [not_observed(by, hidden), temperature_not_seen(turned)];

@@ -45,7 +45,7 @@ pub fn order(run: &Run) -> Option<String> {
             w_last,
         ),
         (
-            "rotate East-North-Up to body instead of body to East-North-Up. Reverse the signs of x, y and z",
+            "are rotations from East-North-Up to body, not from body to East-North-Up. Reverse the signs of x, y and z",
             |attitude| attitude.transpose(),
         ),
     ];
@@ -57,7 +57,8 @@ pub fn order(run: &Run) -> Option<String> {
     let (log_ratio, words) = likelier.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
     (log_ratio > limit).then(|| {
         format!(
-            "the table quaternions {words} (this makes the measured gravity in {} dwells 10^{:.0} times more likely)",
+            "the table quaternions {words} (with this change, the measured gravity in {} dwells is 10^{:.0} times \
+             more likely)",
             rests.len(),
             log_ratio / std::f64::consts::LN_10
         )

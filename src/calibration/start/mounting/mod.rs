@@ -62,7 +62,7 @@ fn known_from(problem: &Problem, motion: &Motion) -> &'static str {
     match problem.model.aiding {
         Aiding::Table => "the table attitudes",
         Aiding::Velocity if motion.labels.is_empty() => {
-            "the gravity direction before and after moves and Earth rate"
+            "gravity directions before and after moves, and Earth rate"
         }
         Aiding::Velocity => "the labels and the gravity direction before and after moves",
     }

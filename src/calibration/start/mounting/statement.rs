@@ -34,7 +34,8 @@ impl fmt::Display for Mounting {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "the axes in run.toml are wrong: {} (e^{:.0} times more likely, from {}). In [imu] of run.toml write\n  {}",
+            "the axes in run.toml are wrong: {} (e^{:.0} times more likely, from {}). In [imu] of run.toml, \
+             write\n  {}",
             said(&self.orders),
             self.log_ratio,
             self.known_from,
@@ -43,7 +44,7 @@ impl fmt::Display for Mounting {
         if !self.others.is_empty() {
             write!(
                 f,
-                "\nThis recording cannot separate these axes from\n  {}",
+                "\nThis recording cannot distinguish these axes from\n  {}",
                 self.others.join("\n  ")
             )?;
         }
@@ -53,8 +54,8 @@ impl fmt::Display for Mounting {
         for sensor in &self.prior_differs {
             write!(
                 f,
-                "\n[imu.prior.{}] refers to the columns in the new order and sign. If scale and bias are those of the \
-                 columns, rearrange them as well.",
+                "\n[imu.prior.{}] refers to the columns in their new order and with their new signs. If scale and \
+                 bias were given for the individual columns, rearrange them in the same way.",
                 sensor.name()
             )?;
         }
