@@ -14,7 +14,7 @@ use crate::calibration::{
 /// and Control*, vol. 2, §9.7 (iterated, linearised filters).
 ///
 /// # Errors
-/// [`CalibrationError`] if the runs cannot give a calibration. Without convergence, the result is an
+/// Returns [`CalibrationError`] if the runs cannot give a calibration. Without convergence, the result is an
 /// [`Outcome`] with `converged = false` and a finding.
 pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, CalibrationError> {
     let start = start(problem)?;

@@ -24,7 +24,7 @@ pub const UNWATCHED: Progress<'static> = &|_| ControlFlow::Continue(());
 /// Reports a pass.
 ///
 /// # Errors
-/// [`CalibrationError::Stopped`] if the callback stops the work.
+/// Returns [`CalibrationError::Stopped`] if the callback stops the work.
 pub fn tell(progress: Progress, pass: &Pass) -> Result<(), CalibrationError> {
     match progress(pass) {
         ControlFlow::Continue(()) => Ok(()),

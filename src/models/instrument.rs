@@ -114,7 +114,7 @@ impl InstallationModel {
     /// Finds and reads an installation.
     ///
     /// # Errors
-    /// If the model does not exist or is malformed.
+    /// Returns an error if the model does not exist or is malformed.
     pub fn load(name_or_path: &str, named_in: &Place) -> Result<Self, ModelError> {
         let file: InstallationFile = text(Room::Installation, name_or_path, named_in)?.parse()?;
         Ok(Self {
@@ -146,7 +146,7 @@ impl Instrument {
     /// Finds and reads an instrument.
     ///
     /// # Errors
-    /// If the model does not exist or is malformed.
+    /// Returns an error if the model does not exist or is malformed.
     pub fn load(name_or_path: &str, named_in: &Place) -> Result<Self, ModelError> {
         let text = text(Room::Imu, name_or_path, named_in)?;
         let InstrumentFile { gyro, accel, terms } = text.parse()?;

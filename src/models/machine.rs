@@ -15,7 +15,7 @@ use turncal_input::{Finite, NonNegative, Positive};
 /// Finds and reads a turntable; returns it with its name.
 ///
 /// # Errors
-/// If the model does not exist or is malformed.
+/// Returns an error if the model does not exist or is malformed.
 pub fn turntable(name_or_path: &str, named_in: &Place) -> Result<(Table, String), ModelError> {
     let text = text(Room::Turntable, name_or_path, named_in)?;
     let file: TableFile = text.parse()?;
@@ -51,7 +51,7 @@ pub fn turntable(name_or_path: &str, named_in: &Place) -> Result<(Table, String)
 /// Finds and reads a path; returns it with its name. Directions such as `earth-rate` refer to the site.
 ///
 /// # Errors
-/// If the model does not exist or is malformed.
+/// Returns an error if the model does not exist or is malformed.
 pub fn path(
     name_or_path: &str,
     named_in: &Place,

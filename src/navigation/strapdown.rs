@@ -160,7 +160,7 @@ impl Strapdown {
     /// Starts from a solution; every step is `period` seconds long.
     ///
     /// # Errors
-    /// If the start is too close to a pole.
+    /// Returns an error if the start is too close to a pole.
     pub fn new(start: Solution, period: f64) -> Result<Self, NearPole> {
         within_reach(start.latitude)?;
         Ok(Self {
@@ -178,7 +178,7 @@ impl Strapdown {
     /// Navigates through one step.
     ///
     /// # Errors
-    /// If the step leads too close to a pole; the solution is then unchanged.
+    /// Returns an error if the step leads too close to a pole; the solution is then unchanged.
     pub fn advance(&mut self, increments: &Increments, height: Height) -> Result<(), NearPole> {
         let (period, start) = (self.period, self.solution);
         let before = self.before.unwrap_or(*increments);

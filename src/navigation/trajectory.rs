@@ -60,7 +60,7 @@ impl Trajectory {
     /// A trajectory of these segments.
     ///
     /// # Errors
-    /// If the segments take no time or a climb is too steep.
+    /// Returns an error if the segments take no time or a climb is too steep.
     pub fn new(start: Start, banks: bool, segments: Vec<Segment>) -> Result<Self, TrajectoryError> {
         let trajectory = Self {
             start,

@@ -213,7 +213,7 @@ pub enum ConversionError {
 /// interpreted as the noise of each sample; without, as a bias instability.
 ///
 /// # Errors
-/// [`ConversionError`] if the unit is not known, or needs a rate.
+/// Returns [`ConversionError`] if the unit is not known, or needs a rate.
 pub fn convert(value: f64, unit: &str, rate: Option<f64>) -> Result<Conversion, ConversionError> {
     let wanted = normalised(unit);
     let matching = || all().filter(|(_, row)| row.names().any(|name| name == wanted));

@@ -118,7 +118,7 @@ impl ImuSamples {
     /// Consecutive samples without a gap; the first begins at `start`, s.
     ///
     /// # Errors
-    /// [`SampleError`], as in [`super::Recording::from_samples`].
+    /// Returns [`SampleError`], as in [`super::Recording::from_samples`].
     pub fn new(
         start: f64,
         period: f64,

@@ -134,7 +134,7 @@ impl Scenario {
     /// and increments the stream.
     ///
     /// # Errors
-    /// If the table cannot follow the path.
+    /// Returns an error if the table cannot follow the path.
     pub fn simulate(&self, seed: u64, stream: u64) -> Result<Simulated, TableError> {
         self.simulate_recording(seed, stream, stream, &Difference::default())
     }
@@ -143,7 +143,7 @@ impl Scenario {
     /// another stream; `own` contains the differences of the parameters in this recording.
     ///
     /// # Errors
-    /// If the table cannot follow the path.
+    /// Returns an error if the table cannot follow the path.
     pub fn simulate_recording(
         &self,
         seed: u64,

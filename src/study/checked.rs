@@ -30,7 +30,7 @@ impl CheckedCalibration {
     /// Checks a solution.
     ///
     /// # Errors
-    /// [`CalibrationError`] if the problem is not the one of the solution.
+    /// Returns [`CalibrationError`] if the problem is not the one of the solution.
     pub fn new(problem: &Problem, solution: Solution) -> Result<Self, CalibrationError> {
         let assessment = solution.assess(problem)?;
         let calibration = solution.calibration(problem, &assessment);

@@ -140,7 +140,7 @@ impl PathStudy {
     /// Evaluates the path and each of its moves.
     ///
     /// # Errors
-    /// [`PathError`] if the table cannot follow the path, or no calibration is possible.
+    /// Returns [`PathError`] if the table cannot follow the path, or no calibration is possible.
     pub fn evaluate(&self) -> Result<Evaluation, PathError> {
         let motion = self.scenario.motion()?;
         let moves = motion.moves();
@@ -176,7 +176,7 @@ impl Evaluation {
     /// Expected results of the calibration of a run, linearised at the triads with which the filter would start.
     ///
     /// # Errors
-    /// [`PathError`] if no calibration is possible.
+    /// Returns [`PathError`] if no calibration is possible.
     pub fn of_run(run: &Run, options: &Options) -> Result<Self, PathError> {
         let problem = Problem::new(run, options);
         let start = coarse_start(&problem)?;

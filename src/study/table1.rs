@@ -146,7 +146,7 @@ impl Table1Study {
     /// Computes the table on all cores. The result does not depend on the number of cores.
     ///
     /// # Errors
-    /// [`Table1Error`] if the configuration is invalid.
+    /// Returns [`Table1Error`] if the configuration is invalid.
     pub fn run(&self) -> Result<Table1, Table1Error> {
         if self.samples < 2 {
             return Err(Table1Error::Samples(self.samples));

@@ -30,7 +30,7 @@ impl Motion {
     /// A rotation about body axes is checked against the lowest limits of all axes.
     ///
     /// # Errors
-    /// If the path does not fit the axes of the table or exceeds its limits.
+    /// Returns an error if the path does not fit the axes of the table or exceeds its limits.
     pub fn new(
         table: &Table,
         path: &Path,

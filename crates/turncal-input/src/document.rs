@@ -85,7 +85,7 @@ impl<'a> Document<'a> {
         })
     }
 
-    /// Fields converted to a type.
+    /// The fields of a document, converted to a type.
     pub fn fill<T: Deserialize<'a>>(self, table: Spanned<DeTable<'a>>) -> Result<T, FileError> {
         T::deserialize(Deserializer::from(table)).map_err(|error| self.refused(&error))
     }

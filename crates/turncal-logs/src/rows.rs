@@ -167,7 +167,7 @@ impl LogRows {
         )
     }
 
-    /// An error about the whole file.
+    /// An error that concerns the whole file.
     pub fn error(
         &self,
         found: impl Display,

@@ -18,7 +18,7 @@ impl Table {
     /// Columns with their names; NaN marks a missing number. Errors refer to the table by `name`.
     ///
     /// # Errors
-    /// [`FileError`] if the columns differ in length.
+    /// Returns [`FileError`] if the columns differ in length.
     pub fn new(
         name: impl AsRef<Path>,
         columns: Vec<(String, Vec<f64>)>,

@@ -40,7 +40,7 @@ pub fn files(document: &Document) -> Vec<(String, String)> {
 /// Writes the [`files`] of a document into an existing directory.
 ///
 /// # Errors
-/// [`ReportError`] if a file cannot be written.
+/// Returns [`ReportError`] if a file cannot be written.
 pub fn write(document: &Document, directory: &Path) -> Result<(), ReportError> {
     for (name, text) in files(document) {
         let path = directory.join(name);

@@ -50,7 +50,7 @@ impl Chain {
     /// Runs the filter with these sizes.
     ///
     /// # Errors
-    /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
+    /// Returns [`CalibrationError::Diverged`] if a covariance is not positive definite.
     pub fn filter(&self, sizes: &Sizes) -> Result<Filtered<'_>, CalibrationError> {
         let mut forward = Forward::new(self.states.count, self.constants.len());
         let passed = self.links.iter().map(|link| forward.pass(link, sizes));
@@ -66,7 +66,7 @@ impl Chain {
     /// Information on the constants from a filter with these sizes, without keeping its links.
     ///
     /// # Errors
-    /// [`CalibrationError::Diverged`] if a part cannot be reduced, or a covariance is not positive definite.
+    /// Returns [`CalibrationError::Diverged`] if a part cannot be reduced, or a covariance is not positive definite.
     pub fn information(
         problem: &Problem,
         script: &Script,
@@ -100,7 +100,7 @@ impl Forward {
     /// Filters one link.
     ///
     /// # Errors
-    /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
+    /// Returns [`CalibrationError::Diverged`] if a covariance is not positive definite.
     fn pass(&mut self, link: &Link, sizes: &Sizes) -> Result<Passed, CalibrationError> {
         let transition = &link.transition;
         let mean = &transition.states * &self.mean + &transition.offset;

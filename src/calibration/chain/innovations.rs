@@ -27,7 +27,7 @@ impl Filtered<'_> {
     /// dwells. `sites` gives the prior of the constants that may be absent.
     ///
     /// # Errors
-    /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
+    /// Returns [`CalibrationError::Diverged`] if a covariance is not positive definite.
     pub fn innovations(
         &self,
         (problem, script): (&Problem, &Script),

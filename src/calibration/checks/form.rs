@@ -50,7 +50,7 @@ impl FormTest {
 /// reject it.
 ///
 /// # Errors
-/// [`CalibrationError::Diverged`] if a covariance is not positive definite.
+/// Returns [`CalibrationError::Diverged`] if a covariance is not positive definite.
 pub fn form_test(problem: &Problem, solved: &Solved) -> Result<Option<FormTest>, CalibrationError> {
     let general = InstallationForm::General;
     let angles = |form: InstallationForm| 2 * form.angle_names().len();

@@ -24,7 +24,7 @@ use crate::calibration::{Direction, Finding, Quality, Verdict, Word};
 use crate::imu::{AXES, BodyFrame, InstallationForm, Nominal, Output, PerSensor, Sensor, Triad};
 use crate::run::Aiding;
 
-/// The version of the format.
+/// The version of the file format.
 pub const FORMAT: &str = "turncal-calibration/1";
 /// The version of the format with temperature dependence.
 pub const FORMAT_WITH_TEMPERATURE: &str = "turncal-calibration/2";

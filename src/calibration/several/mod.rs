@@ -48,8 +48,8 @@ impl<'a> Problem<'a> {
     /// to all; a recording without a dwell is excluded with a finding.
     ///
     /// # Errors
-    /// [`CalibrationError`] if there is no recording, or if a recording has no temperature although parameters depend
-    /// on temperature.
+    /// Returns [`CalibrationError`] if there is no recording, or if a recording has no temperature although parameters
+    /// depend on temperature.
     pub fn together(
         runs: &[&'a Run],
         options: &Options,
@@ -90,7 +90,7 @@ pub struct Start {
 /// The start of a problem: the coarse start of a single recording, or the separate estimates of several recordings.
 ///
 /// # Errors
-/// [`CalibrationError`] if a recording has no start.
+/// Returns [`CalibrationError`] if a recording has no start.
 pub fn start(problem: &Problem) -> Result<Start, CalibrationError> {
     if !problem.varies() && problem.runs().nth(1).is_none() {
         let CoarseStart { at, attitudes, .. } = coarse_start(problem)?;

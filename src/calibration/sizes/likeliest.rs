@@ -93,7 +93,7 @@ impl<'a> Search<'a> {
     /// Each step lowers the cost.
     ///
     /// # Errors
-    /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
+    /// Returns [`CalibrationError::Diverged`] if a covariance is not positive definite.
     pub fn likeliest(&self, start: At, sites: &Sites) -> Result<Here<'a>, CalibrationError> {
         let mut here = self.here(start, sites)?;
         for _ in 0..STEPS {

@@ -27,7 +27,7 @@ impl Equations {
     /// is understated, rows must not move parameters that they hardly show far from the prior.
     ///
     /// # Errors
-    /// [`CalibrationError::Singular`] with the triad of an unknown that is not a number.
+    /// Returns [`CalibrationError::Singular`] with the triad of an unknown that is not a number.
     pub fn step(&self) -> Result<ParameterVector, CalibrationError> {
         let Some(&first) = self.unknown.first() else {
             return Ok(ParameterVector::zeros());

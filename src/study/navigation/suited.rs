@@ -78,7 +78,7 @@ impl Mission {
     /// misalignment form.
     ///
     /// # Errors
-    /// As for [`Self::navigate`].
+    /// The same errors as [`Self::navigate`].
     pub fn outlook(
         &self,
         estimate: &Estimate,

@@ -1,4 +1,4 @@
-//! A calibration whose values a command uses.
+//! A calibration whose values are used by a command.
 
 use std::path::Path;
 

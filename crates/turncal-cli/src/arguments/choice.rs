@@ -1,4 +1,4 @@
-//! Options whose value is one of a few names.
+//! Options that accept one of a few names.
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
@@ -74,7 +74,7 @@ pub const AIDINGS: [Choice<Aiding>; 2] = [
     ),
 ];
 
-/// Policies for the noise used by the filter. Names without a description are not listed in the help.
+/// Policies for choosing the noise that the filter uses. The help does not list names without a description.
 pub const NOISE: [Choice<NoisePolicy>; 4] = [
     (
         "stated",

@@ -1,4 +1,4 @@
-//! Output options, identical in every command.
+//! Output options, which are the same in every command.
 
 use std::path::{Path, PathBuf};
 
@@ -44,7 +44,7 @@ impl Delivery {
         self.output.as_deref()
     }
 
-    /// Whether JSON is requested.
+    /// Whether JSON output is requested.
     pub fn json(&self) -> bool {
         self.json
     }
@@ -68,7 +68,7 @@ impl Delivery {
     }
 }
 
-/// Delivery with its directory created.
+/// The delivery, with its output directory created.
 pub struct Begun<'a> {
     directory: Option<(&'a Path, WholeDirectory)>,
     json: bool,

@@ -1,4 +1,4 @@
-//! Error terms as arguments.
+//! Error terms as command-line arguments.
 
 use anyhow::bail;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
@@ -44,7 +44,7 @@ fn help(term: ErrorTerm) -> &'static str {
     }
 }
 
-/// Exits with the wrong-usage status if the term is a table error and the table is not observed.
+/// Exits with the status for wrong usage if the term is a table error and the table is not observed.
 pub fn needs_table(term: ErrorTerm, aiding: Option<Aiding>) {
     let of_table = matches!(term, ErrorTerm::TableBase | ErrorTerm::TableAxes(_));
     if of_table && aiding == Some(Aiding::Velocity) {

@@ -1,4 +1,4 @@
-//! Estimation options of a run, identical for a single run and a lot.
+//! Options that control how a run is estimated, which are the same for a single run and a lot.
 
 use super::choice::{AIDINGS, FORMS, METHODS, NOISE, one_of};
 use anyhow::Context;
@@ -52,7 +52,7 @@ impl Estimation {
         }
     }
 
-    /// Calibration problem for a run.
+    /// Calibration problem for one run.
     pub fn problem<'a>(&self, run: &'a Run, path: &std::path::Path) -> anyhow::Result<Problem<'a>> {
         if self.aiding == Some(Aiding::Table) && run.recording.table.is_none() {
             return Err(CalibrationError::NoTable).with_context(|| path.display().to_string());
@@ -83,7 +83,7 @@ impl Estimation {
         Ok(problem)
     }
 
-    /// The options, without the checks that need a run.
+    /// The options, before the checks that need a run.
     pub fn options(&self) -> Options {
         Options {
             form: self.installation,

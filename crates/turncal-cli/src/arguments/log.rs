@@ -48,7 +48,7 @@ pub struct OfLog {
 }
 
 impl OfLog {
-    /// The stream name and the user's statements about the log.
+    /// The stream name, and the information about the log that the user gave.
     pub fn stated(&self) -> anyhow::Result<(Option<&str>, Stated)> {
         let stated = Stated {
             accel_file: self.accel_file.as_deref().map(DataFile::from),
@@ -64,7 +64,7 @@ impl OfLog {
         Ok((self.stream.as_deref(), stated))
     }
 
-    /// Reads a run, or a log with the given statements; shows the fields found in a log.
+    /// Reads a run, or a log with the information given in options; for a log, shows the detected fields.
     pub fn open(&self, path: &Path) -> anyhow::Result<Opened> {
         self.open_with(path, |found| show_found(path, found))
     }
@@ -78,7 +78,7 @@ impl OfLog {
         })?)
     }
 
-    /// Does the same as [`Self::open`], but passes the fields found in a log to `show`.
+    /// Does the same as [`Self::open`], but passes the detected fields to `show`.
     pub fn open_with(&self, path: &Path, show: impl FnOnce(&[Found])) -> anyhow::Result<Opened> {
         let (stream, stated) = self.stated()?;
         Ok(Opened::new(path, stream, &stated, |draft| {
@@ -87,7 +87,7 @@ impl OfLog {
     }
 }
 
-/// Shows the fields found in a log on standard error.
+/// Shows the fields detected in a log on standard error.
 pub fn show_found(path: &Path, found: &[Found]) {
     tell!("Found in {}:", printable(&path.display().to_string()));
     for of in found {
@@ -109,7 +109,7 @@ pub fn run_file(text: &str) -> Result<PathBuf, String> {
     }
 }
 
-/// Path of a run.toml or a log, or `-`; for a run directory, the error message names the file in the directory.
+/// Path of a run.toml or a log, or `-`; if the path is a run directory, the error message names the file in it.
 pub fn run_or_log(text: &str) -> Result<PathBuf, String> {
     let path = Path::new(text);
     let inside = path.join("run.toml");

@@ -19,7 +19,8 @@ pub struct Sharding {
 }
 
 impl Sharding {
-    /// Runs the requested part of a study, unless its results already exist; returns false if the whole study is requested.
+    /// Runs the requested part of a study unless its results already exist; returns false if the whole study was
+    /// requested.
     pub fn make<S: Study<Trial: Serialize> + Serialize>(
         self,
         job: JobKind,

@@ -26,14 +26,14 @@ const APART: Duration = Duration::from_millis(500);
 
 /// Rows to follow.
 pub struct Follow<'a> {
-    /// A growing file, `-` or a device.
+    /// A growing file, `-` for standard input, or a device.
     pub source: &'a Path,
     pub of_log: &'a OfLog,
-    /// The run.toml that describes the rows; rows of a pipe or a device are saved in the log file given there.
+    /// The run.toml that describes the rows; rows from a pipe or a device are saved in the log file that it names.
     pub run: Option<&'a Path>,
     pub options: Options,
     pub specification: Option<Specification>,
-    /// File in which the rows of a pipe or a device are saved.
+    /// File in which rows from a pipe or a device are saved.
     pub keep: Option<&'a Path>,
     /// Time without growth after which a file counts as complete.
     pub patience: Duration,

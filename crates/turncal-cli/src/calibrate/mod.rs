@@ -457,7 +457,7 @@ fn say(recording: &Recording) {
     }
 }
 
-/// Solves a calibration problem and shows each pass.
+/// Solves a calibration problem, and shows each pass while doing so.
 pub fn solve(problem: &Problem, method: Method, activity: &Activity) -> anyhow::Result<Solution> {
     let name = &problem.run().recording.name;
     activity.next(format!("calibrating {name}"));

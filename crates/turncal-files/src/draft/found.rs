@@ -1,4 +1,4 @@
-//! Fields detected in a log, with their certainty.
+//! Fields detected in a log, and how certain they are.
 
 use std::path::Path;
 
@@ -23,7 +23,7 @@ pub struct Found {
 }
 
 impl Draft {
-    /// All detected fields, in the order of the display.
+    /// All detected fields, in the order in which they are displayed.
     pub fn found(&self) -> Vec<Found> {
         vec![
             self.time_found(),

@@ -1,4 +1,4 @@
-//! The prior of a draft: scale and bias are estimated from the recording, and the other values are typical of
+//! The prior in a draft: scale and bias are estimated from the recording, and the other values are typical of
 //! instruments with similar noise.
 
 use nalgebra::Vector3;
@@ -68,7 +68,7 @@ impl Class {
 }
 
 impl Stated {
-    /// An instrument with outputs in rad/s and m/s², if its noise is stated.
+    /// An instrument whose outputs are in rad/s and m/s², if its noise is stated.
     pub fn instrument(&self) -> Option<Instrument> {
         let noise = self.noise?;
         let class = Class::of(|sensor| Some(noise.get(sensor).random_walk));
@@ -86,7 +86,7 @@ impl Stated {
 }
 
 impl Draft {
-    /// The prior of a triad: stated, from a data sheet, or typical of its class.
+    /// The prior of a triad: stated by the user, from a data sheet, or typical of its class.
     pub fn prior(&self, sensor: Sensor, remarks: &mut Remarks) -> PriorFile {
         let class = Class::of(|sensor| self.white_noise(sensor));
         let unit = self.quantities.units.get(sensor);

@@ -20,8 +20,8 @@ use turncal_input::{Finite, Gravity, Height, Latitude, NonNegative, Positive};
 type NoiseFields = BTreeMap<String, Option<NonNegative>>;
 
 impl Draft {
-    /// The draft as a `run.toml` with this name for the log. Lines with `TODO` must be completed before it can be read;
-    /// the others are guesses, each with its reason.
+    /// The draft as the text of a `run.toml` in which the log has this name. Lines with `TODO` must be completed before
+    /// the file can be read; the other lines are guesses, each with its reason.
     pub fn to_toml(&self, file: &str) -> String {
         let (run, remarks) = self.run_file(file);
         page::text(FORMAT, &run, &remarks)
@@ -299,7 +299,7 @@ impl Draft {
         }
     }
 
-    /// Why triads identified by their values are only a guess, and what to check.
+    /// Reasons why triads that were identified by their values are only a guess, and what to check.
     pub fn doubt_words(&self, doubt: &Doubt) -> String {
         match doubt {
             Doubt::Order(order) => {

@@ -20,15 +20,15 @@ use turncal::number::rounded;
 /// Sums of pulses vary less than sums of readings by more than this factor.
 const PULSE_SUMS: f64 = 0.5;
 
-/// Unit of a triad, as far as known.
+/// Unit of a triad, as far as it is known.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Unit {
-    /// Name in `run.toml`, if known.
+    /// Name in `run.toml`, if it is known.
     pub word: Option<&'static str>,
     pub why: String,
     /// Whether the unit is confirmed by motion or stated by the user.
     pub is_shown: bool,
-    /// Whether the rows are not whole numbers and fit no known unit.
+    /// Whether the rows are not whole numbers and do not fit any known unit.
     pub is_unfit: bool,
     /// Scale of counts, if determined.
     pub scale: Option<Scale>,
@@ -245,7 +245,7 @@ impl Quantities {
         }
     }
 
-    /// The first stated unit that motion contradicts, if motion confirms another: evidence, statement, remedy.
+    /// The first stated unit that the motion contradicts while it confirms another unit: evidence, stated unit, remedy.
     pub fn contradiction(
         &self,
         stated: &Stated,
@@ -306,8 +306,8 @@ impl Quantities {
         self.units.get(sensor).word == Some("count")
     }
 
-    /// For rates: the sample period for which the turns fit the unit of the gyros, whether this unit is stated, named
-    /// in the file or detected.
+    /// For rates: the sample period for which the turns fit the unit of the gyros, and whether this unit is stated,
+    /// named in the file or detected.
     pub fn turned_period(
         &self,
         stated: &Stated,

@@ -1,4 +1,4 @@
-//! Parameters for PX4, ArduPilot, Betaflight and INAV: offsets, and accelerometer scales.
+//! Parameters for PX4, ArduPilot, Betaflight and INAV: offsets, and scales of the accelerometers.
 //!
 //! PX4 and ArduPilot compute `(n − offset) ⊙ scale` for accelerometers and `n − offset` for gyros, in sensor axes, and
 //! then rotate to body axes (`SENS_BOARD_ROT`, `AHRS_ORIENTATION`). INAV and Betaflight do the same in whole counts.

@@ -98,11 +98,12 @@ impl Format {
     }
 }
 
-/// Writes a calibration in a format. A run of the same instrument gives noise figures, sample rate and the nominal
-/// scales by which counts are divided, for formats in rad/s and m/s².
+/// Writes a calibration in a given format. A run of the same instrument gives noise figures, sample rate and the
+/// nominal scales by which counts are divided, for formats in rad/s and m/s².
 ///
 /// # Errors
-/// If the calibration has no inverse, contains an unknown term, or does not belong to the instrument of the run.
+/// Returns an error if the calibration has no inverse, contains an unknown term, or does not belong to the instrument
+/// of the run.
 pub fn write(
     record: &Calibration,
     format: &Format,

@@ -1,4 +1,4 @@
-//! Comments above the values of a format, one line each: instrument, definitions, omissions.
+//! Comments above the values in a file, one line each: instrument, definitions, omissions.
 
 use super::affine::{Affine, Residual};
 use super::notation::{comment, list};
@@ -7,7 +7,7 @@ use turncal::calibration::result::{Calibration, EQUATION, Method};
 use turncal::imu::{AxisOrder, PerSensor, Sensor, Term};
 use turncal::run::Aiding;
 
-/// A part of the calibration that nearly every format omits.
+/// A part of the calibration that almost every format omits.
 pub const SIGMA: &str = "sigma and covariance of the parameters; both are in calibration.json";
 
 /// A calibration in a format.
@@ -15,7 +15,7 @@ pub const SIGMA: &str = "sigma and covariance of the parameters; both are in cal
 pub struct Exported {
     /// Text of the file.
     pub bytes: Vec<u8>,
-    /// Omissions of the format, one sentence each, which are also in the file.
+    /// Omissions of the format, one sentence each; the file states them too.
     pub notes: Vec<String>,
 }
 
@@ -31,7 +31,7 @@ pub struct Remarks<'a> {
 }
 
 impl<'a> Remarks<'a> {
-    /// Comments that begin with `mark` and list these omissions and all error terms.
+    /// Comments that begin with `mark` and list the given omissions and all error terms.
     pub fn new(values: &'a Values<'a>, mark: &'static str, omissions: &[&str]) -> Self {
         Self {
             values,
@@ -62,7 +62,8 @@ impl<'a> Remarks<'a> {
         self
     }
 
-    /// Adds the axes of the values, their direction or the reading program, and the divisor of the raw output.
+    /// Adds the axes of the values, the direction of these axes or the program that reads them, and the divisor of the
+    /// raw output.
     pub fn reads(self, what: &str) -> Self {
         let axes = match self.values.order {
             AxisOrder::IDENTITY => "right, front, up",
@@ -104,7 +105,7 @@ impl<'a> Remarks<'a> {
         self.omissions.iter().cloned().chain(note).collect()
     }
 
-    /// Returns all lines as comments.
+    /// Returns all lines of the comments.
     pub fn text(&self) -> String {
         let omitted = self.omitted().join("; ");
         let omitted = (!omitted.is_empty()).then(|| format!("not included: {omitted}"));
@@ -118,7 +119,7 @@ impl<'a> Remarks<'a> {
         self.of_file((self.text() + text).into_bytes())
     }
 
-    /// A file that contains these comments in its own form, or not at all.
+    /// A file whose own form contains these comments, or which has none.
     pub fn of_file(&self, bytes: Vec<u8>) -> Exported {
         Exported {
             bytes,
@@ -151,7 +152,7 @@ pub fn title(record: &Calibration) -> String {
     parts.join("; ")
 }
 
-/// Definitions of `N` and `u`, for formats that contain the values of the record unchanged.
+/// Definitions of `N` and `u`, for formats that contain the values of the calibration file unchanged.
 pub fn equation(values: &Values) -> [String; 2] {
     let record = values.record;
     let axes = match &record.columns {

@@ -19,9 +19,9 @@ pub struct ImuLog<'a> {
     pub clock: Clock<'a>,
     /// Source of the accelerometers, if they are not in the gyro rows.
     pub accel_from: Option<(Source<'a>, Clock<'a>)>,
-    /// Column and number of the selected instrument, if the log has several.
+    /// Column that identifies the instrument, and its number, if the log contains several instruments.
     pub instance: Option<(&'a str, f64)>,
-    /// Empty names for a missing triad.
+    /// The names are empty for a missing triad.
     pub triads: PerSensor<[&'a str; 3]>,
     pub temperature: Option<TemperatureColumns<'a>>,
     pub output: Output,
@@ -68,7 +68,7 @@ impl Layout {
         [0, 1, 2].map(|axis| along(axis).unwrap_or(first + axis))
     }
 
-    /// One rad or one m/s along right, front and up, in the unit of the corresponding column.
+    /// The unit of the corresponding column that equals one rad or one m/s, along right, front and up.
     pub fn body_nominal(&self, log: &ImuLog, sensor: Sensor) -> Vector3<f64> {
         let columns = self.columns(sensor);
         Vector3::from_fn(|axis, _| {

@@ -1,4 +1,4 @@
-//! Two streams with separate clocks, combined into rows with one clock.
+//! Two streams with separate clocks, which are combined into rows with one clock.
 //!
 //! Gyros are unchanged. Accelerometers are integrated over each gyro sample: their integral is known at the edges of
 //! their samples and interpolated by a cubic through four of them. The sum over samples is exact, so errors do not
@@ -21,11 +21,11 @@ pub struct Part<'a> {
     pub source: &'a Source<'a>,
     pub clock: Clock<'a>,
     pub columns: [&'a str; 3],
-    /// Columns passed on unchanged.
+    /// Columns that are passed on unchanged.
     pub further: &'a [&'a str],
 }
 
-/// Column names of both triads, made unique.
+/// Column names of both triads, modified so that each is unique.
 pub fn distinct(triads: &PerSensor<[&str; 3]>) -> PerSensor<[String; 3]> {
     let bare = |name: &str| name.strip_prefix('-').unwrap_or(name).to_owned();
     let clash = |name: &str| triads.gyro.iter().any(|other| bare(other) == bare(name));

@@ -1,4 +1,4 @@
-//! Sources of rows and their clocks, as described in `run.toml`.
+//! Sources of rows and their clocks, described in `run.toml`.
 
 use crate::schema::instrument::Fields;
 use crate::schema::{TimeColumn, TimeUnitField};

@@ -156,7 +156,7 @@ pub struct TableLogFile<'a> {
 }
 
 impl TableLogFile<'_> {
-    /// Reads the log of a run with these samples; `notes` receives remarks about the file.
+    /// Reads the table log of a run with these samples; `notes` receives remarks about the file.
     pub fn read(&self, imu: &ImuSamples, notes: &mut Vec<String>) -> Result<TableLog, FileError> {
         let mut csv = self.source.open()?;
         let mut stamps = self.clock.start(&mut csv)?.without_bursts();

@@ -19,7 +19,7 @@ pub struct TemperatureColumns<'a> {
 }
 
 impl<'a> TemperatureColumns<'a> {
-    /// One column for both triads, or one or three columns for each triad.
+    /// One column for both triads, or one column or three columns for each triad.
     pub fn of_fields(column: &'a TemperatureColumn, unit: TemperatureUnit) -> Self {
         let mut all = Self {
             names: Vec::new(),
@@ -50,7 +50,7 @@ impl<'a> TemperatureColumns<'a> {
         })
     }
 
-    /// The columns without repetitions.
+    /// The columns, each listed only once.
     pub fn names(&self) -> &[&'a str] {
         &self.names
     }
@@ -122,7 +122,7 @@ impl Temperatures {
         }
     }
 
-    /// The temperatures, if the stamps are delayed by this time relative to the start of the first sample, s.
+    /// Returns the temperatures, for stamps that are delayed by this time relative to the start of the first sample, s.
     pub fn read(self, file: &str) -> Read {
         let facts = self.channels.first().and_then(|channel| {
             let count: f64 = channel.spans.iter().map(|of| f64::from(of.1)).sum();

@@ -1,4 +1,4 @@
-//! `calibration.json` and `truth.json`, which are validated by the same checks on reading and on writing.
+//! `calibration.json` and `truth.json`; the same checks validate them on reading and on writing.
 //!
 //! A failed calibration is written with values of any size, because its findings state that they must not be used.
 

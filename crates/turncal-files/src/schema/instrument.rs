@@ -18,7 +18,7 @@ use turncal_input::{Document, FileError, OneOrThree, list, suggestion};
 use turncal_logs::DataFile;
 use turncal_logs::clock::{Breaks, Clock};
 
-/// Default 1σ of scale factors, misalignments and biases, typical of consumer MEMS.
+/// Default 1σ of scale factors, misalignments and biases, typical of consumer MEMS sensors.
 pub const USUAL_SCALE: f64 = 50_000.0 * PPM;
 pub const USUAL_INSTALLATION: f64 = 2.0 * DEGREE;
 /// Default 1σ of biases, rad/s and m/s².
@@ -26,9 +26,9 @@ pub const USUAL_BIAS: PerSensor<f64> = PerSensor {
     gyro: 2.0 * DEGREE,
     accel: 1.0,
 };
-/// Sample period assumed until it is estimated from motion, s.
+/// Sample period that is assumed until it has been estimated from motion, s.
 pub const USUAL_PERIOD: f64 = 0.01;
-/// Relative 1σ of a rate that no time stamps confirm: the tolerance of the oscillators in MEMS sensors.
+/// Relative 1σ of a rate that is not confirmed by time stamps: the tolerance of the oscillators in MEMS sensors.
 pub const RATE_SIGMA: f64 = 0.01;
 /// Maximum relative 1σ of a scale factor.
 const WIDEST_SCALE: f64 = 10.0;
@@ -51,14 +51,14 @@ pub struct Fields<'a> {
 pub struct InstrumentFields<'a> {
     pub log: ImuLog<'a>,
     pub known: Instrument,
-    /// Whether the sample period is stated neither in run.toml nor by a time column.
+    /// Whether neither run.toml nor a time column gives the sample period.
     pub without_period: bool,
     /// Relative 1σ of the sample period.
     pub period_sigma: f64,
 }
 
 impl<'a> Fields<'a> {
-    /// The fields of a document; the files named in the document are in its directory.
+    /// The fields of a document; the files that it names are in its directory.
     pub fn new(document: Document<'a>, run: &'a RunFile, in_memory: &'a [DataFile]) -> Self {
         Self {
             document,

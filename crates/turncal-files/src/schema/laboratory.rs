@@ -8,7 +8,7 @@ use toml::de::{DeTable, DeValue};
 use turncal::laboratory::{Condition, Laboratory};
 use turncal_input::{Document, FileError, small_file};
 
-/// The version of the format.
+/// The version of the file format.
 const FORMAT: &str = "turncal-laboratory/1";
 
 /// A lab.toml to be completed.

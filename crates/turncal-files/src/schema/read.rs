@@ -26,15 +26,15 @@ const NOISE_OF_MEANS: f64 = 300.0 * MICRO_G_PER_SQRT_HZ;
 
 /// Reads `run.toml` and the files given in it, relative to itself.
 ///
-/// Everything is checked: known fields, finite and possible numbers, uniform time, overlapping files. Samples, nominal
-/// scales and priors are returned along right-front-up for any `body_axes`. If the site, noise, period or prior is not
-/// stated, it gets a wide default, with a note.
+/// Checks everything: that fields are known, numbers are finite and possible, times are uniform and files overlap. The
+/// samples, nominal scales and priors are along the right, front and up axes, whatever `body_axes` is. If the site,
+/// noise, period or prior is not stated, it gets a wide default, with a note.
 pub fn read_run(path: &Path) -> Result<Run, FileError> {
     run_of_text(path, &text_of(path)?, Some(path), &[])
 }
 
-/// Reads the text of a `run.toml` located (or assumed) next to this file and read from `source`; the files given in it
-/// may be in memory.
+/// Reads the text of a `run.toml` that is located (or assumed to be) next to this file and was read from `source`; the
+/// files that it names may be in memory.
 pub fn run_of_text(
     path: &Path,
     text: &str,
@@ -115,7 +115,7 @@ pub fn read_meta(path: &Path) -> Result<BTreeMap<String, String>, FileError> {
     Ok(meta)
 }
 
-/// Refuses a `run.toml` that [`crate::read_run`] would refuse for any content of the files given in it.
+/// Refuses a `run.toml` that [`crate::read_run`] would refuse whatever the named files contain.
 pub fn check(document: Document) -> Result<(), FileError> {
     let run = run_file(document)?;
     let mut fields = Fields::new(document, &run, &[]);

@@ -26,7 +26,7 @@ impl BodyAxes {
     }
 }
 
-/// The moment within a sample that its time stamp marks.
+/// The part of a sample that its time stamp marks.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema,
 )]

@@ -1,4 +1,4 @@
-//! A [`Run`] as a run directory.
+//! Writes a [`Run`] as a run directory.
 
 use super::calibration_json;
 use std::collections::BTreeMap;

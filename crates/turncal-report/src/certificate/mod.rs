@@ -82,7 +82,7 @@ impl Certificate {
     /// The certificate of a calibration; the SHA-256 is that of the calibration file.
     ///
     /// # Errors
-    /// [`CertificateError`] if the calibration must not be used, or a field is missing.
+    /// Returns [`CertificateError`] if the calibration must not be used, or a field is missing.
     pub fn new(
         calibration: Calibration,
         sha256: String,

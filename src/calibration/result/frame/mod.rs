@@ -31,7 +31,7 @@ pub struct Named<'a> {
 /// assumed to have the units of the other record.
 ///
 /// # Errors
-/// [`ComparisonError`] if the units differ or a record cannot be converted.
+/// Returns [`ComparisonError`] if the units differ or a record cannot be converted.
 pub fn in_common_form(
     first: Named,
     second: Named,

@@ -1,4 +1,4 @@
-//! Fields of a calibration that follow from each other: a file in which they disagree was edited or damaged.
+//! Fields of a calibration that follow from each other: if they disagree, the file was edited or damaged.
 
 use std::iter::zip;
 
