@@ -114,7 +114,7 @@ pub enum ComparisonError {
     Unit {
         /// The triad.
         sensor: Sensor,
-        /// The first record that states a unit.
+        /// The calibration file that states a different unit.
         name: String,
         /// Unit.
         expected: String,

@@ -38,7 +38,7 @@ pub struct Solved {
     pub converged: bool,
 }
 
-/// Iterates from a starting point, with these priors of the initial attitudes.
+/// Iterates from a starting point, with the given priors of the initial attitudes.
 ///
 /// # Errors
 /// Returns [`CalibrationError`] if no pass is possible at the start. If the iterations do not converge, the result is

@@ -175,8 +175,8 @@ fn calibrated(last: &InterimCalibration) -> String {
     format!("calibration of the first {time} s: {word}{codes}")
 }
 
-/// The first sentence of each finding: first the findings about the rows, then those that restrict the use of the last
-/// calibration.
+/// The first sentence of each finding, with the findings about the rows first and then those that restrict the use of
+/// the last calibration.
 pub fn notes(run: &Run, status: &Status) -> Vec<String> {
     let mut findings = run.recording.doubts.clone();
     findings.extend(check::of_survey(&status.survey));

@@ -31,7 +31,7 @@ pub fn unit(block: ErrorTerm) -> (&'static str, f64) {
     }
 }
 
-/// Rows of the parameter table, with errors if `errors` requests them and the truth states them.
+/// Rows of the parameter table; the errors are included if `errors` is true and the truth states them.
 pub fn rows(
     auxiliary: &Auxiliary,
     truth: &BTreeMap<String, TermRecord>,
@@ -87,7 +87,7 @@ pub fn parameter_row(
     row
 }
 
-/// Prior σ divided by posterior σ, with a note if the parameter was not observed.
+/// Prior σ divided by posterior σ; a note is added if the parameter was not observed.
 pub fn improvement(prior: f64, posterior: f64) -> String {
     let ratio = prior / posterior;
     if !ratio.is_finite() {

@@ -14,8 +14,8 @@ const BLOCK: usize = 100;
 /// A filtered link.
 #[derive(Debug, Clone)]
 pub struct Passed {
-    /// States before the rows are used: the mean if all constants are zero, the effect of the constants, and the
-    /// covariance.
+    /// States before the rows are used: the mean for the case that all constants are zero, the effect of the constants,
+    /// and the covariance.
     pub mean: DVector<f64>,
     pub by_constants: DMatrix<f64>,
     pub covariance: DMatrix<f64>,
@@ -47,7 +47,7 @@ pub struct Filtered<'a> {
 }
 
 impl Chain {
-    /// Runs the filter with these sizes.
+    /// Runs the filter with these sizes of the effects.
     ///
     /// # Errors
     /// Returns [`CalibrationError::Diverged`] if a covariance is not positive definite.

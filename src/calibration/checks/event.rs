@@ -30,7 +30,7 @@ pub enum EventKind {
     Slip(Slip),
 }
 
-/// An event that is too large to result from its effect by chance, even with heavy tails.
+/// An event that is too large to result from its effect by chance, even if the effect has a heavy-tailed distribution.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Event {
     /// Kind.

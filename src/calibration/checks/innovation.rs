@@ -50,13 +50,14 @@ pub struct Innovation {
     pub time: f64,
     /// Kind of observation.
     pub observation: Observation,
-    /// East, North and Up in units of their own σ, independent of each other.
+    /// East, North and Up components, each divided by its own σ; the three are independent.
     pub whitened: [f64; 3],
     /// σ of the three components, rad or m/s.
     pub sigma: [f64; 3],
     /// Number of the dwell that contains the observation.
     pub dwell: usize,
-    /// Whether the innovation shows the errors of the move before its dwell; false if rows are missing between the two.
+    /// Whether the innovation shows the errors of the move before its dwell; false if rows are missing between move and
+    /// dwell.
     pub after_move: bool,
 }
 
@@ -148,8 +149,8 @@ fn over_dwells(innovations: &[&Innovation]) -> Vec<f64> {
     summed.collect()
 }
 
-/// The finding on innovations that do not agree with their covariance, if any. `pulses` are the kinds of observation
-/// that contain remainders of pulses.
+/// The finding on innovations that do not agree with their covariance, if there is one. `pulses` are the kinds of
+/// observation that contain remainders of pulses.
 pub fn inconsistent(innovations: &[Innovation], pulses: &[Observation]) -> Option<Finding> {
     let of = |kind| innovations.iter().filter(move |i| i.observation == kind);
     let kinds = Observation::ALL.map(|kind| (kind, of(kind).collect::<Vec<_>>()));

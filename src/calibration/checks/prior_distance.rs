@@ -60,10 +60,10 @@ fn is_another_scale(model: &Model, estimate: &Estimate, index: usize) -> bool {
 
 /// The finding on parameters for which the data alone contradict the prior, if the estimate includes the prior.
 ///
-/// A prior that is too tight constrains the estimate, so the distance of this estimate from the prior is not
+/// If the prior is too tight, it constrains the estimate, so the distance of this estimate from the prior is not
 /// informative. With `P⁻¹ = S⁻¹ + V⁻¹` (S for the prior, V for the data), the distance of the estimate is `P V⁻¹` times
-/// that of the data, and its covariance for a correct prior is `P S⁻¹ P V⁻¹ = S − P`: normalised, it equals the
-/// distance of data and prior over both σ.
+/// that of the data. For a correct prior, its covariance is `P S⁻¹ P V⁻¹ = S − P`. Normalised, it thus equals the
+/// distance between data and prior relative to both σ.
 pub fn far_by_data(model: &Model, estimate: &Estimate) -> Option<Finding> {
     let mut by_data = estimate.vector();
     let mut sigma = estimate.sigma();
@@ -85,8 +85,8 @@ pub fn far_by_data(model: &Model, estimate: &Estimate) -> Option<Finding> {
 }
 
 /// The model with a prior widened so that its estimate does not contradict it: σ of every parameter is at least its
-/// distance. `None` if no parameter contradicts the prior. If the prior were wrong, correct observations would become
-/// outliers, and the error of the prior would be taken as noise.
+/// distance. `None` if no parameter contradicts the prior. With a wrong prior, correct observations would become
+/// outliers, and the error of the prior would be taken for noise.
 pub fn widened(model: &Model, estimate: &Estimate) -> Option<Model> {
     let off = estimate.vector() - model.prior_mean;
     let known: Vec<usize> = estimate

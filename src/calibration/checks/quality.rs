@@ -25,8 +25,8 @@ use crate::units::MICRO_G;
 pub struct Quality {
     /// Residuals over the whole recording.
     pub all: Measures,
-    /// Cross-validation: residuals of a calibration without every other dwell, over these dwells and the turns that
-    /// end in them; `None` if the other dwells do not give a calibration.
+    /// Cross-validation: residuals of a calibration without every other dwell, evaluated in the omitted dwells and the
+    /// turns that end in them; `None` if the other dwells do not give a calibration.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub held_out: Option<Measures>,
     /// Residuals in each dwell.
@@ -47,8 +47,8 @@ pub struct DwellResidual {
     pub number: usize,
     /// Magnitude of the mean specific force minus gravity, m/s².
     pub gravity: f64,
-    /// Angle between the gravity direction measured by the accelerometers and the one carried over from the previous
-    /// dwell by the gyros, rad; `None` in the first dwell of a stretch.
+    /// Angle between the gravity direction measured by the accelerometers and the direction that the gyros carried over
+    /// from the previous dwell, rad; `None` in the first dwell of a stretch.
     pub direction: Option<f64>,
 }
 

@@ -1,4 +1,4 @@
-//! Test whether recordings differ by more than stated.
+//! Tests whether recordings differ by more than stated.
 
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -45,7 +45,7 @@ impl RecordingDifference {
     }
 }
 
-/// The finding on estimated differences, if there are any.
+/// The finding on differences between recordings that were estimated, if there are any.
 pub fn recordings_differ(differences: &[RecordingDifference]) -> Option<Finding> {
     let one =
         |of: &RecordingDifference| format!("{} = {:.2e} (stated {})", of.key, of.found, of.stated);

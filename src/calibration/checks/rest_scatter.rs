@@ -19,12 +19,12 @@ const PULSES: f64 = 2.0;
 /// A scatter smaller than this part of the stated noise is shown as zero.
 const NO_NOISE: f64 = 1e-3;
 
-/// Findings on triads whose scatter at rest disagrees with the noise that the user imposed (`NoisePolicy::Stated`).
+/// Findings on triads whose scatter at rest disagrees with the noise that the user requested (`NoisePolicy::Stated`).
 /// Calibrated inputs are used, because a wrong prior scale factor is not noise.
 ///
-/// A step lasts a tenth of a second, as in the filter: faster errors average out, and only random walk, bias and
-/// vibration of the mount remain. The result does not change the calibration, because this test does not distinguish
-/// between these three causes.
+/// A step lasts a tenth of a second, as in the filter: errors that change faster average out, and only random walk,
+/// bias and vibration of the mount remain. The result does not change the calibration, because this test does not
+/// distinguish between these three causes.
 pub fn scatter_at_rest(problem: &Problem, calibrated: &PerSensor<Triad>) -> Vec<Finding> {
     let runs = problem.runs().enumerate();
     let each = runs.flat_map(|(recording, run)| Sensor::ALL.map(|sensor| (recording, run, sensor)));

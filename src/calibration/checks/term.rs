@@ -14,7 +14,7 @@ use crate::statistics::FALSE_ALARM;
 /// A term that a path does not show is reported if it increases the σ of a group by more than this factor.
 const NAMED: f64 = 1.25;
 
-/// Whether a candidate that is absent with this probability counts as present, if there are this many candidates.
+/// Whether a candidate with this probability of absence counts as present, given the number of candidates.
 pub fn is_shown(absent: f64, candidates: usize) -> bool {
     absent < FALSE_ALARM / candidates.max(1) as f64
 }

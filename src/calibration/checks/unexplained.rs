@@ -68,7 +68,7 @@ pub fn unexplained(all: &Nis, innovations: &[Innovation]) -> Option<Finding> {
     rejected("NIS", all.mean, worst.0)
 }
 
-/// The finding for a closed form, from the findings on its residuals.
+/// The finding for a closed form, derived from the findings on its residuals.
 pub fn unexplained_residuals(findings: &[Finding]) -> Option<Finding> {
     let large = |finding: &&Finding| finding.is(Kind::ResidualsLarge);
     findings.iter().filter(large).find_map(|finding| {

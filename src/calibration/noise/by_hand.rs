@@ -22,8 +22,8 @@ pub type Parts = [DVector<f64>; BY_HAND.len()];
 /// Additional noise that makes the errors more likely than the stated noise.
 ///
 /// The noise is estimated by maximum likelihood, with the parameters integrated out under their prior. If there are
-/// only a few more equations than parameters, the residuals do not show the noise, because parameter values that are
-/// unlikely under the prior can explain any noise.
+/// only a few more equations than parameters, the residuals do not show the noise, because unlikely parameter values
+/// can explain any noise.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ByHand {
     found: Vec<Component>,

@@ -16,7 +16,7 @@ use crate::number::three_digits;
 pub struct NoiseReport {
     /// The requested policy.
     pub policy: NoisePolicy,
-    /// Whether the noise was estimated; if not, the stated noise was used.
+    /// Whether the noise was estimated; if it was not, the stated noise was used.
     pub learnt: bool,
     /// The test of the stated noise; `None` if no figure was tested.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -147,7 +147,7 @@ fn symbol(unit: &str) -> String {
     })
 }
 
-/// A finding lists a stated figure if the estimate is more than this many times as large.
+/// A finding lists a stated figure if the estimate is more than this many times as large as the figure.
 pub const NAMED: f64 = 1.5;
 
 /// The finding on estimated noise, with the squared distance of the worst stated figure and its limit. `None` if no

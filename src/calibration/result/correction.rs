@@ -12,7 +12,7 @@ use crate::imu::{
 use crate::recording::{Near, TEMPERATURE_SPACING};
 use crate::run::Run;
 
-/// The correction `u = (K C)⁻¹ (N − D) − t(q)` of a record, in the file's quantity per second.
+/// The correction `u = (K C)⁻¹ (N − D) − t(q)` from a calibration file, in the file's quantity per second.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Correction {
     /// `K C` of each triad: the file's quantity per second for one rad/s or m/s² along right, front
@@ -22,7 +22,7 @@ pub struct Correction {
     pub matrix: PerSensor<Matrix3<f64>>,
     /// `D`, the file's quantity per second.
     pub bias: PerSensor<Vector3<f64>>,
-    /// Parameters `q` of error terms, in SI; zero if the record has none.
+    /// Parameters `q` of the error terms, in SI units; zero if the calibration file has none.
     pub terms: TermVector,
     /// The record, if it depends on temperature.
     changing: Option<Box<Calibration>>,

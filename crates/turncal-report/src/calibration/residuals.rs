@@ -4,8 +4,8 @@ use super::tables::{ANGLE, FORCE};
 use crate::prelude::*;
 use turncal::calibration::{DwellResidual, Quality};
 
-/// Magnitude of the gravity residuals in each dwell and after each move, for the nominal and the calibrated instrument;
-/// rings mark dwells excluded from a fit.
+/// Magnitude of the gravity residuals in each dwell and after each move, for the nominal and for the calibrated
+/// instrument; rings mark dwells excluded from a fit.
 pub fn figure(quality: &Quality) -> Plot {
     let panel = |name: &str, place: &str, units, of: fn(&DwellResidual) -> Option<f64>| {
         let points = |dwells: &[DwellResidual]| -> Vec<Point> {

@@ -1,4 +1,4 @@
-//! The tables, the same for terminal and page.
+//! The tables, which are the same on the terminal and on the page.
 
 use super::super::terms;
 use super::super::terms::improvement;
@@ -58,7 +58,7 @@ impl Report<'_> {
     }
 }
 
-/// The least observed directions: all that are not observed, and some that are.
+/// The least observed directions: all directions that are not observed, and some that are observed.
 pub fn weakest(outcome: &Outcome) -> Table {
     let observability = &outcome.observability;
     let shown = observability.unobserved().count() + WEAKEST;
@@ -126,7 +126,7 @@ pub fn cross_validation(quality: &Quality) -> Option<String> {
     (!parts.is_empty()).then(|| format!("{} ({} dwells)", parts.join("; "), held_out.gravity.count))
 }
 
-/// Each residual over the whole recording and over the excluded dwells; empty without data.
+/// Each residual, over the whole recording and over the excluded dwells; empty if there are no data.
 pub fn residuals(quality: &Quality, table: Option<&TableLog>) -> Table {
     let turns = match table {
         Some(_) => "attitude after a turn, gyros minus table",

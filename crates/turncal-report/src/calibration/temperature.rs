@@ -106,7 +106,7 @@ pub fn hysteresis(form: InstallationForm, thermal: &Thermal) -> Table {
 }
 
 /// Figure of every parameter against temperature. Each mark is at a temperature and shows the change of the parameter
-/// from the reference; `meaning` describes the marks.
+/// from its value at the reference temperature; `meaning` describes the marks.
 pub fn curves(
     estimate: &Estimate,
     thermal: &Thermal,

@@ -1,4 +1,4 @@
-//! The tables, the same for terminal and page.
+//! The tables, which are the same on the terminal and on the page.
 
 use crate::prelude::*;
 use turncal::imu::{InstallationForm, Sensor};

@@ -122,8 +122,8 @@ fn verdict(row: &Row) -> String {
     }
 }
 
-/// Table of every quantity. A few calibrations are shown side by side, with the truth or the difference; three or more
-/// have a mean and a scatter.
+/// Table of every quantity. Up to a few calibrations are shown side by side, with the truth or the difference; for
+/// three or more, the table shows a mean and a scatter.
 pub fn quantities(lot: &Lot) -> Table {
     let mut columns = Columns::<Quantity>(Vec::new());
     columns.push("", title);
@@ -288,7 +288,7 @@ fn notes(lot: &Lot, mut table: Table) -> Table {
     }
 }
 
-/// For a single unit, all limits, with the exceeded limits first; for several units, only limits that are exceeded or
+/// For a single unit, all limits (exceeded limits first); for several units, only limits that are exceeded or
 /// undecided.
 pub fn limits(lot: &Lot) -> Table {
     let row = |row: &Row, check: &Check| {

@@ -9,7 +9,7 @@ const HEADING: &str = "Navigation with this calibration";
 /// One mission, navigated with several calibrations.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Flown {
-    /// Motion of the body, such as `stationary and level`.
+    /// Motion of the body in words, such as `stationary and level`.
     pub how: &'static str,
     /// Conclusion, in a sentence.
     pub shows: &'static str,
@@ -197,8 +197,8 @@ fn figure(navigated: &[MethodOutlook], last: &str) -> Plot {
     Plot::new("navigation.svg", heading, (1, 250), panels).caption(caption)
 }
 
-/// Figure of the errors against time in a readable unit, drawn over the ±σ band of the last calibration; only σ if no
-/// error is known.
+/// Figure of the errors against time in a readable unit, drawn over the ±σ band of the last calibration; if no error is
+/// known, the figure shows only σ.
 pub fn panel(quantity: Quantity, navigated: &[MethodOutlook]) -> Panel {
     let (unit_of_time, second) = clock(navigated);
     let (unit, scale) = quantity.readable_unit(greatest(quantity, navigated));

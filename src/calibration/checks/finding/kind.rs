@@ -12,7 +12,7 @@ pub enum Level {
     Partial,
     /// The values may be used if the finding is taken into account.
     Care,
-    /// The result already accounts for the finding.
+    /// The result already takes the finding into account.
     Note,
 }
 

@@ -12,7 +12,7 @@ use crate::units::DEGREE;
 
 /// All findings on quantities that the path of a filter's run does not determine.
 ///
-/// Parameters that are far from their prior count as determined, because the prior is wrong.
+/// Parameters that are far from their prior count as determined, because this distance shows that the prior is wrong.
 pub fn not_observed_by_path(outcome: &Outcome, far: Option<&Finding>) -> Vec<Finding> {
     let (form, hidden) = (outcome.estimate.form(), outcome.unobserved().into_iter());
     let mut parameters: Vec<String> = hidden.filter_map(|i| parameter_name(form, i)).collect();

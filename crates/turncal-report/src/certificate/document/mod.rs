@@ -18,7 +18,7 @@ use turncal::imu::ParameterKind;
 use turncal::laboratory::{Authorised, Condition, Contact};
 use turncal::run::Aiding;
 
-/// Files of a certificate: PDF, XML and the calibration; the latter two are also embedded in the PDF.
+/// Files of a certificate: PDF, XML and the calibration; the XML file and the calibration are also embedded in the PDF.
 ///
 /// # Errors [`PdfError`] if a text cannot be shown.
 pub fn files(

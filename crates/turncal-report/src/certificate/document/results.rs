@@ -18,7 +18,7 @@ pub fn two_digits(of: f64, expanded: f64) -> (f64, f64) {
     }
 }
 
-/// Every parameter with its expanded uncertainty, and the definitions of both.
+/// Every parameter with its expanded uncertainty, and the definitions of parameter and uncertainty.
 pub fn results(certificate: &Certificate) -> Table {
     let has_budget = certificate.calibration.budget.is_some();
     let row = |of: &Measured| {
