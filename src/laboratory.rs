@@ -1,5 +1,5 @@
 //! Statements of a calibration laboratory about itself, its customer and the item. These statements are not derived
-//! from data; a certificate shows them.
+//! from data; they appear in the certificate.
 
 use serde::Deserialize;
 

@@ -43,7 +43,7 @@ pub struct TermLeftOff {
 /// effect on the covariance.
 ///
 /// # Errors
-/// Returns [`CalibrationError`] as for [`super::estimate`].
+/// Returns [`CalibrationError`] under the same conditions as [`super::estimate`].
 pub fn bound(
     problem: &Problem,
     truth: &PerSensor<Triad>,
@@ -56,7 +56,7 @@ pub fn bound(
 /// The bound, and the 1σ of the parameters without each move in turn.
 ///
 /// # Errors
-/// Returns [`CalibrationError`] as for [`super::estimate`].
+/// Returns [`CalibrationError`] under the same conditions as [`super::estimate`].
 pub fn bound_without_moves(
     problem: &Problem,
     truth: &PerSensor<Triad>,
@@ -93,7 +93,7 @@ pub fn bound_without_moves(
 /// The constant error terms that a problem does not estimate, linearised at a truth as in [`bound`].
 ///
 /// # Errors
-/// Returns [`CalibrationError`] as for [`super::estimate`].
+/// Returns [`CalibrationError`] under the same conditions as [`super::estimate`].
 pub fn terms_left_off(
     problem: &Problem,
     truth: &PerSensor<Triad>,

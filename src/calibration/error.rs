@@ -118,7 +118,7 @@ pub enum ComparisonError {
         name: String,
         /// Unit.
         expected: String,
-        /// The record that states another unit.
+        /// Name of the calibration that states a different unit.
         other: String,
         /// The other unit.
         found: String,

@@ -41,8 +41,8 @@ pub struct Solved {
 /// Iterates from a starting point, with the given priors of the initial attitudes.
 ///
 /// # Errors
-/// Returns [`CalibrationError`] if no pass is possible at the start. If the iterations do not converge, the result is
-/// marked as not converged.
+/// Returns [`CalibrationError`] if the first pass fails at the starting point. If the iterations do not converge, the
+/// result is marked as not converged.
 pub fn solve(
     problem: &Problem,
     (start, priors): (&Linearisation, &[AttitudePrior]),

@@ -102,7 +102,7 @@ impl Solution {
         self.outcome().is_none_or(|outcome| outcome.converged)
     }
 
-    /// Whether the solution may be used: the filter converged, and noise explains the residuals.
+    /// Whether the solution may be used, that is, whether the filter converged and noise explains the residuals.
     pub fn is_usable(&self) -> bool {
         match self {
             Self::Filter(outcome) => outcome.is_usable(),
@@ -113,7 +113,7 @@ impl Solution {
     /// Evaluates the residuals of gravity and turns, and the uncertainty budget.
     ///
     /// # Errors
-    /// Returns [`CalibrationError`] if the problem is not the one of the solution.
+    /// Returns [`CalibrationError`] if the solution belongs to a different problem.
     pub fn assess(&self, problem: &Problem) -> Result<Assessment, CalibrationError> {
         match self {
             Self::Filter(outcome) => {

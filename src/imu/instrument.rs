@@ -21,7 +21,7 @@ pub struct Instrument {
     pub noise_is_stated: PerSensor<bool>,
     /// Noise added during moves.
     pub motion_noise: PerSensor<MotionNoise>,
-    /// Prior 1σ of each error-term parameter, with mean zero; 0 if a term is off.
+    /// Prior 1σ of each parameter of an error term, whose prior mean is zero; 0 if the term is off.
     pub term_sigma: TermVector,
     /// Error terms that are stated to be absent.
     pub absent_terms: Vec<Term>,

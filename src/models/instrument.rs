@@ -26,7 +26,7 @@ pub struct Instrument {
     pub noise: PerSensor<Noise>,
     /// Variation between instruments of the grade before calibration.
     pub variation: PerSensor<Variation>,
-    /// 1σ of each error-term parameter, with mean zero; 0 for terms that the instrument does not have.
+    /// 1σ of each parameter of an error term, with a mean of zero; 0 for terms that the instrument does not have.
     pub term_sigma: TermVector,
     /// Error terms that are stated to be absent.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

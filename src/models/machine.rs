@@ -48,7 +48,7 @@ pub fn turntable(name_or_path: &str, named_in: &Place) -> Result<(Table, String)
     Ok((table, text.name()))
 }
 
-/// Finds and reads a path; returns it with its name. Directions such as `earth-rate` refer to the site.
+/// Finds and reads a path; returns it with its name. Directions such as `earth-rate` are those at the site.
 ///
 /// # Errors
 /// Returns an error if the model does not exist or is malformed.

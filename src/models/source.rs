@@ -96,7 +96,7 @@ pub fn names(room: Room) -> impl Iterator<Item = &'static str> {
     room.embedded().map(|(name, _)| name)
 }
 
-/// Place from which a model is referred to, which determines how the name is resolved.
+/// Location from which a model is referred to, which determines how the name is resolved.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Place {
     /// The command line: the name is a path relative to the working directory, or an embedded name.
@@ -114,7 +114,7 @@ pub struct Text {
     pub text: String,
     /// File name used in messages.
     pub file: String,
-    /// Place that this model is, when it refers to other models.
+    /// Location of this model, from which its references to other models are resolved.
     pub place: Place,
 }
 

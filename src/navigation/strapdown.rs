@@ -116,7 +116,7 @@ impl Instant {
     }
 }
 
-/// Treatment of the height. The error of a free height grows by a factor of e in ten minutes.
+/// Treatment of the height. The error of a free height grows by a factor of e in every ten minutes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Height {
     /// Free height.
@@ -130,7 +130,7 @@ pub enum Height {
     },
 }
 
-/// Navigation came too close to a pole.
+/// Navigation comes too close to a pole.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 #[error(
     "navigation reached latitude {:.3}°, but the heading is undefined near a pole in East-North-Up: stay within \

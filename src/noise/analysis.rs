@@ -64,8 +64,8 @@ fn known(labels: &[String]) -> String {
 }
 
 impl Stretch {
-    /// The longest segment with this label; without a label, the longest standstill, or the longest segment
-    /// of a recording that is not continuous.
+    /// The longest segment with this label. Without a label, the longest standstill; if the recording is not
+    /// continuous, the longest segment.
     ///
     /// # Errors [`StretchError`] if there is no such stretch, or if it is too short.
     pub fn find(run: &Run, label: Option<&str>) -> Result<Self, StretchError> {

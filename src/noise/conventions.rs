@@ -1,8 +1,8 @@
 //! The conventions for noise figures, and their users.
 //!
-//! Each row of the table contains a unit, its value in SI units, and the relation of the figure to the strength of the
-//! process. Densities are two-sided (IEEE Std 952): white noise of density N has `σ = N √rate` in samples at that rate.
-//! Sources: Kalibr, *IMU Noise Model* (wiki); PSINS, `imuerrset`; KF-GINS, its configuration file.
+//! Each row of the table contains a unit, its value in SI units, and the factor between the figure and the strength of
+//! the process. Densities are two-sided (IEEE Std 952): white noise of density N has `σ = N √rate` in samples at that
+//! rate. Sources: Kalibr, *IMU Noise Model* (wiki); PSINS, `imuerrset`; KF-GINS, its configuration file.
 
 use Scale::{Increments, Linear, Power, Samples};
 use serde::Serialize;
@@ -199,7 +199,7 @@ pub enum ConversionError {
         /// The unit, as given by the user.
         unit: String,
     },
-    /// The figure is per sample, but no sample rate is given.
+    /// The figure is noise per sample, but no sample rate is given.
     #[error(
         "`{unit}` is noise per sample, which needs the sample rate: add --rate with the rate in Hz"
     )]
@@ -209,8 +209,8 @@ pub enum ConversionError {
     },
 }
 
-/// Converts a figure into every convention of its quantity. With a sample rate in Hz, an ambiguous unit is
-/// interpreted as the noise of each sample; without, as a bias instability.
+/// Converts a figure into every convention of its quantity. With a sample rate in Hz, an ambiguous unit is interpreted
+/// as noise per sample; without a sample rate, as a bias instability.
 ///
 /// # Errors
 /// Returns [`ConversionError`] if the unit is not known, or needs a rate.

@@ -73,7 +73,7 @@ impl Recording {
         Ok(Self::of(name, imu))
     }
 
-    /// Uses the name of the recording, such as `x_up`, as the label of a position.
+    /// Uses the name of the recording, such as `x_up`, as the label of its position.
     pub fn label_by_name(&mut self) {
         let (imu, label) = (&self.imu, self.name.to_lowercase());
         let axes = imu

@@ -32,7 +32,8 @@ impl Series {
         self.len() == 0
     }
 
-    /// Whether the increments are packed, which makes reading slower; unpacking many at once takes memory.
+    /// Whether the increments are packed. Reading packed increments is slower, and unpacking many of them at once takes
+    /// memory.
     pub fn is_packed(&self) -> bool {
         self.packed.is_some()
     }

@@ -48,9 +48,9 @@ impl Line {
 }
 
 impl Run {
-    /// If all moves agree with one offset and one drift of the table clock, converts the times of the table readings to
-    /// the IMU clock, and returns a note that says so. It is unknown which of the two clocks drifts, so the drift is
-    /// treated as an error of the sample period.
+    /// If all moves are consistent with one offset and one drift of the table clock, converts the times of the table
+    /// readings to the IMU clock, and returns a note about this conversion. It is unknown which of the two clocks
+    /// drifts, so the drift is treated as an error of the sample period.
     pub fn align_table(&mut self) -> Option<String> {
         let table = self.recording.table.as_ref()?;
         if agree(self, &moves(self, table)) {

@@ -36,7 +36,7 @@ pub struct Scenario {
     pub installation: InstallationModel,
     /// The true body frame: in the accelerometer frame, the misalignment angles that this frame fixes are not drawn.
     pub body_frame: BodyFrame,
-    /// True values that are stated and not drawn at random.
+    /// True values that are stated instead of being drawn at random.
     pub given: PerSensor<Given>,
     /// The table.
     pub table: Table,
@@ -59,8 +59,8 @@ pub struct Scenario {
     pub seed: u64,
 }
 
-/// True values of a triad that a scenario states; other values are drawn at random. The prior is still the prior of the
-/// grade.
+/// True values of a triad that a scenario states; other values are drawn at random. The prior is still the prior for
+/// the grade.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Given {
     /// Scale factors − 1.

@@ -234,7 +234,7 @@ impl Mission {
         self.errors_from(&ErrorVector::zeros(), pair)
     }
 
-    /// Does the same as [`Self::errors`], but starts with these errors.
+    /// Does the same as [`Self::errors`], but navigation starts with these errors.
     ///
     /// # Errors
     /// The same errors as [`Self::navigate`].

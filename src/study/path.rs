@@ -60,7 +60,8 @@ pub struct Evaluation {
     pub navigation: Vec<Outlook>,
 }
 
-/// Accuracy of a calibration that lacks one move: attitude, velocity and position may change arbitrarily during it.
+/// Accuracy of a calibration without the information from one move: attitude, velocity and position may change
+/// arbitrarily during this move.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Without {
     /// Time of the move and the dwell after it, s.

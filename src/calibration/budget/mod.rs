@@ -83,7 +83,7 @@ impl Budget {
     /// The budget of the estimate of an outcome.
     ///
     /// # Errors
-    /// Returns [`CalibrationError`] if the problem is not the one of the outcome.
+    /// Returns [`CalibrationError`] if the outcome belongs to a different problem.
     pub fn new(problem: &Problem, outcome: &Outcome) -> Result<Self, CalibrationError> {
         let problem = &problem.with(|model| model.prior_sigma = outcome.model.prior_sigma);
         let by_source = of_chain(problem, outcome)?;

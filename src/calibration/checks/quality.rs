@@ -143,7 +143,7 @@ impl Outcome {
     /// Residuals of gravity and turns over the whole recording.
     ///
     /// # Errors
-    /// Returns [`CalibrationError`] if the problem is not the one of the outcome.
+    /// Returns [`CalibrationError`] if the outcome belongs to a different problem.
     pub(in crate::calibration) fn residuals(
         &self,
         problem: &Problem,
@@ -160,7 +160,7 @@ impl Outcome {
     /// Cross-validation solves the chain without the rows of every other dwell, at the linearisation point of the last pass.
     ///
     /// # Errors
-    /// Returns [`CalibrationError`] if the problem is not the one of the outcome.
+    /// Returns [`CalibrationError`] if the outcome belongs to a different problem.
     pub fn quality(&self, problem: &Problem) -> Result<Quality, CalibrationError> {
         let Solved {
             script, effects, ..
@@ -190,7 +190,7 @@ impl ClosedForm {
     /// [`Outcome::quality`].
     ///
     /// # Errors
-    /// Returns [`CalibrationError`] if the problem is not the one of the closed form.
+    /// Returns [`CalibrationError`] if the closed form belongs to a different problem.
     pub fn quality(&self, problem: &Problem) -> Result<Quality, CalibrationError> {
         let run = problem.run();
         let of = |triads: &PerSensor<Triad>, judged: &dyn Fn(usize) -> bool| {

@@ -101,7 +101,7 @@ pub enum CorrectionError {
 }
 
 impl Correction {
-    /// The correction of a record, without constants of the table (`table.…`).
+    /// The correction from a calibration file, without the constants of the table (`table.…`).
     pub fn of_record(record: &Calibration) -> Result<Self, CorrectionError> {
         let sensitivity = PerSensor::from_fn(|sensor| record.triad(sensor).sensitivity());
         let inverse = |sensor: Sensor| {
@@ -134,7 +134,8 @@ impl Correction {
         })
     }
 
-    /// The correction, with a check that the record belongs to the run's instrument: units and nominal scales must agree.
+    /// The correction, after a check that the calibration belongs to the instrument of the run: units and nominal
+    /// scales must agree.
     pub fn for_run(record: &Calibration, run: &Run) -> Result<Self, CorrectionError> {
         let correction = Self::of_record(record)?;
         for sensor in Sensor::ALL {
@@ -175,10 +176,10 @@ impl Correction {
 
     /// Calibrates these samples of a run, in sequence.
     ///
-    /// Error terms are evaluated at the calibrated sample. The angular acceleration for the size effect is the
-    /// difference of the rates before and after; it is zero if the record is not continuous. The time offset uses the
-    /// inertial rate instead of the rate relative to the Earth: with Earth rate, the error is 0.7 µg for an offset of
-    /// 10 ms.
+    /// Error terms are evaluated with the calibrated sample. The angular acceleration for the size effect is derived
+    /// from the rates before and after the sample; it is zero if the recording is not continuous. The correction for
+    /// the time offset uses the inertial rate instead of the rate relative to the Earth: with Earth rate, the error is
+    /// 0.7 µg for an offset of 10 ms.
     pub fn samples<'a>(
         &'a self,
         run: &'a Run,
@@ -223,8 +224,9 @@ impl Correction {
         })
     }
 
-    /// Angular rate and specific force of one sample of outputs, in the file's quantity per second, for an angular
-    /// acceleration in rad/s² (used by size effect and time offset). Temperature dependence is not applied.
+    /// Angular rate and specific force for one sample of outputs, in the file's quantity per second, with a given
+    /// angular acceleration in rad/s² (used for size effect and time offset). The temperature dependence is not
+    /// applied.
     pub fn of_outputs(
         &self,
         outputs: &PerSensor<Vector3<f64>>,

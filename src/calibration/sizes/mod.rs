@@ -43,11 +43,11 @@ struct Size {
 /// Distance of a linearisation point from the estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stage {
-    /// The point is far: errors of the linearisation dominate the residuals.
+    /// The point is far from the estimate: errors of the linearisation dominate the residuals.
     Far,
-    /// The point is near for the first time.
+    /// The point is near the estimate for the first time.
     FirstNear,
-    /// The point is near, as in the previous pass.
+    /// The point is near the estimate, as in the previous pass.
     Near,
 }
 

@@ -59,8 +59,8 @@ fn way(steps: impl Iterator<Item = (f64, f64, f64)>, noise: f64, zero: f64) -> [
     [all, moment / all.max(f64::MIN_POSITIVE), fastest]
 }
 
-/// Reports moves for which gyros and table differ in angle or time; if there are no such moves, reports a gyro scale
-/// factor that all moves together contradict.
+/// Reports moves for which gyros and table differ in angle or time; if there are none, reports a gyro scale factor that
+/// all moves together contradict.
 ///
 /// This reveals missing rows in one log, clock drift and logs from different runs, for any time stamps.
 pub fn clock(run: &Run) -> Option<String> {
@@ -176,8 +176,8 @@ fn bias_at_rest(run: &Run, stands: &[Dwell]) -> (Vector3<f64>, f64) {
 }
 
 /// Returns the moves that both logs resolve, each from the middle of one standstill of the table to the middle of the
-/// next. Also returns the spans before the first move and after the last move that both logs cover. Two moves that are
-/// treated as one would have a time error if the scale factors of their axes differed.
+/// next. Also returns the spans before the first move and after the last move that both logs cover. If two moves were
+/// treated as one and the scale factors of their axes differed, the move would have a time error.
 pub fn moves(run: &Run, table: &TableLog) -> Vec<Move> {
     let imu = &run.recording.imu;
     let stands = standstills(run, table);

@@ -24,7 +24,8 @@ impl Run {
         checks.iter().filter_map(|check| check(self)).collect()
     }
 
-    /// A sentence on the true order or direction of the table quaternions, if gravity contradicts the stated one.
+    /// A sentence that states the true order or direction of the table quaternions, if gravity contradicts the stated
+    /// one.
     pub fn table_quaternions(&self) -> Option<String> {
         quaternions::order(self)
     }

@@ -14,7 +14,7 @@ type Reading = fn(&Matrix3<f64>) -> Matrix3<f64>;
 /// Reports quaternions that agree with the accelerometers' gravity only if their columns are in another order, or
 /// if they rotate East-North-Up to the body.
 ///
-/// Specific force at rest points up, except for errors within the prior σ. The likelihood ratio of two hypotheses
+/// Specific force at rest points up, apart from errors within the prior σ. The likelihood ratio of two hypotheses
 /// follows from their sums of squared residuals, with the variance estimated from each sum. For the stated order, the
 /// best of all 48 axis orders of the accelerometers is used, because that order is also only stated and is tested by
 /// another check.

@@ -25,8 +25,8 @@ pub struct Mounting {
     pub others: Vec<String>,
     /// Whether a latitude of opposite sign would explain the motion equally well.
     pub or_latitude: bool,
-    /// Triads whose `[imu.prior]` contains values that differ between axes, or biases that change sign with a reversed
-    /// column.
+    /// Triads whose `[imu.prior]` contains values that differ between axes, or biases whose sign changes if a column is
+    /// reversed.
     pub prior_differs: Vec<Sensor>,
 }
 
