@@ -114,7 +114,7 @@ pub enum ComparisonError {
     Unit {
         /// The triad.
         sensor: Sensor,
-        /// The calibration file that states a different unit.
+        /// Name of the first calibration that states a unit.
         name: String,
         /// Unit.
         expected: String,

@@ -159,7 +159,8 @@ fn transport_slopes(truth: &Solution, transport: &Vector3<f64>) -> (Matrix3<f64>
     (by_velocity, by_position)
 }
 
-/// The error model over a step: `x ← Φ x + Γ ε`; the same for sensitivities to constants, with `∂ε/∂θ` for ε.
+/// The error model over a step: `x ← Φ x + Γ ε`. Sensitivities to constants obey the same equation, with `∂ε/∂θ` in
+/// place of ε.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Transition {
     /// Φ.

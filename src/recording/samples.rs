@@ -80,7 +80,7 @@ pub enum SampleError {
     /// A number is not finite.
     #[error("sample {sample} is not finite; remove it, or split the recording there")]
     NotFinite {
-        /// The first sample that contains such a number.
+        /// The first sample that contains a non-finite number.
         sample: usize,
     },
     /// An invalid period.

@@ -30,8 +30,8 @@ pub struct ByHand {
 }
 
 impl ByHand {
-    /// Adds sources one by one while the improvement is significant, from the prior errors of the equations and their
-    /// covariance due to prior and stated noise.
+    /// Adds sources one by one while the improvement is significant, given the errors of the equations at the prior and
+    /// the covariance of these errors due to prior and stated noise.
     pub fn likeliest(
         errors: &DVector<f64>,
         covariance: &DMatrix<f64>,
