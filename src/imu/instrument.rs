@@ -6,7 +6,7 @@ use super::{
     Triad, TriadVector,
 };
 
-/// An instrument as known from its data sheet and from experience.
+/// An instrument, described by the knowledge from its data sheet and from experience.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Instrument {
     /// Nominal scale of each triad: the file's quantity per second for one rad/s or m/s².

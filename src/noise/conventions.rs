@@ -129,7 +129,7 @@ static QUANTITIES: [Quantity; 6] = [
         row("°/h/√h", Linear(DEG_PER_H / SQRT_H), "rate random walk: IEEE Std 952", &["deg/h1.5", "deg/h3/2"]),
         row("°/h/√s", Linear(DEG_PER_H), "rate random walk over one second", &[]),
         row("rad/s²/√Hz", Linear(1.0), "Kalibr `gyroscope_random_walk`; rad/s/√s", &["rad/s/sqrts"]),
-        row("°/s²/√Hz", Linear(DEGREE), "the same in degrees: logs of MEMS gyros; °/s/√s", &["deg/s/sqrts"]),
+        row("°/s²/√Hz", Linear(DEGREE), "rate random walk in degrees: logs of MEMS gyros; °/s/√s", &["deg/s/sqrts"]),
         row("°/s/√h", Linear(DEGREE / SQRT_H), "rate random walk over one hour", &[]),
         row("rad²/s³", Power(1.0), "power spectral density of the bias rate: Q of a Kalman filter", &[]),
     ] },

@@ -41,7 +41,7 @@ use crate::turntable::{Imperfection, Moves, TableError};
 /// A run with its truth.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Simulated {
-    /// The run as a laboratory would record it.
+    /// The run, in the form in which a laboratory would record it.
     pub run: Run,
     /// The instrument's true parameters; if they depend on temperature, the values at the reference of
     /// [`Self::thermal`].

@@ -69,7 +69,7 @@ impl Chamber {
     }
 }
 
-/// Temperature of an instrument every second.
+/// Temperature of an instrument at intervals of one second.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Warming {
     values: Vec<f64>,

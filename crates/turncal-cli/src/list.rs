@@ -15,7 +15,7 @@ use turncal_report::{Document, Facts};
   turncal list
   turncal list --json | jq -r '.[].name'")]
 pub struct List {
-    /// Print only one JSON document with the list
+    /// Print the list as a single JSON document, without any other output
     #[arg(long)]
     json: bool,
 }

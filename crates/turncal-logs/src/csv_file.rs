@@ -26,7 +26,7 @@ use turncal_input::{FileError, Place, counted, excerpt};
 /// First bytes of a gzipped file.
 const GZIP: [u8; 2] = [0x1f, 0x8b];
 
-/// A file of rows, positioned at one row.
+/// A file of rows with its current row.
 ///
 /// Fields are separated by commas, semicolons, tabs or blanks, according to most rows. Lines that begin with `#`, `%`
 /// or `//` are comments; comments above the names, or above rows of numbers without names, form a preamble. Columns

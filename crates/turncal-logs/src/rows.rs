@@ -80,7 +80,7 @@ pub trait Rows {
     }
 }
 
-/// A file at one of its rows, with the columns in use.
+/// A file of rows with its current row and the columns that are used.
 pub struct LogRows {
     rows: Box<dyn Rows>,
     used: Vec<usize>,

@@ -65,7 +65,7 @@ impl Table {
     }
 }
 
-/// A table, positioned at one of its rows.
+/// A table with its current row.
 pub struct TableRows {
     table: Table,
     /// Units of the columns; empty if not stated.

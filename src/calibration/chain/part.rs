@@ -1,4 +1,5 @@
-//! Reduction of a part of a dwell, disturbed only by noise at rest, to whitened rows in the states at its beginning.
+//! Reduces a part of a dwell, in which noise at rest is the only disturbance, to whitened equations for the states at
+//! the beginning of the part.
 //!
 //! At rest, the parameters act through three constant rates and three constant specific forces. If these and the states
 //! at the beginning (together `g`) are given, only noise remains. A filter of the moving states whitens this noise in

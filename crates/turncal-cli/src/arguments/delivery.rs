@@ -31,7 +31,7 @@ pub struct Delivery {
     /// Directory in which to write a report
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
-    /// Print only one JSON document with the results
+    /// Print the results as a single JSON document, without any other output
     #[arg(long)]
     json: bool,
     #[command(flatten)]

@@ -126,7 +126,7 @@ pub struct Calibrate {
     /// Time in s without growth after which a followed file counts as complete
     #[arg(long, value_name = "S", requires = "follow", value_parser = seconds, default_value = "30", help_heading = FOLLOWING)]
     patience: Duration,
-    /// Print only one JSON document, which contains the calibration or the evaluation of the lot
+    /// Print the calibration, or the evaluation of the lot, as a single JSON document, without any other output
     #[arg(long)]
     json: bool,
     /// Print all parameters, tests and findings

@@ -27,7 +27,7 @@ pub struct Noise {
     /// Sample rate in Hz, to convert noise per sample
     #[arg(long, value_name = "HZ", allow_negative_numbers = true, value_parser = positive)]
     rate: Option<f64>,
-    /// Print only one JSON document with the results
+    /// Print the results as a single JSON document, without any other output
     #[arg(long)]
     json: bool,
 }

@@ -83,7 +83,7 @@ pub enum TimeUnitField {
 }
 
 impl TimeUnitField {
-    /// The unit of time from its text in a file.
+    /// Parses the name of a unit of time in a file.
     pub fn of_text(text: &str) -> Self {
         match text.parse() {
             Ok(tick) => Self::Tick(Positive(tick)),

@@ -4,7 +4,7 @@ use std::io::{self, Read, Seek, SeekFrom};
 
 use crate::data_file::Content;
 
-/// Why and where the reading of a file stopped.
+/// The reason for which the reading of a file stopped, and the position.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Broken {
     /// Offset from the start of the file, in bytes.

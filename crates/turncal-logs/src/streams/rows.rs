@@ -9,7 +9,7 @@ use crate::data_file::DataFile;
 use crate::rows::Rows;
 use turncal_input::{FileError, Place, list, suggestion};
 
-/// A log, positioned at one sample of one of its streams.
+/// A log with the current sample of one of its streams.
 pub struct StreamRows {
     file: PathBuf,
     log: Box<dyn Log>,

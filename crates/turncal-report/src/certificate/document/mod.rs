@@ -193,11 +193,11 @@ fn method(certificate: &Certificate) -> Facts {
 fn evaluation(aiding: Option<Aiding>) -> &'static str {
     match aiding {
         Some(Aiding::Table) => {
-            "error-state Kalman filter with Gauss–Newton iterations, observing standstill and the attitude of the \
-             turntable"
+            "error-state Kalman filter with Gauss–Newton iterations, which observes standstill and the attitude of \
+             the turntable"
         }
         Some(Aiding::Velocity) => {
-            "error-state Kalman filter with Gauss–Newton iterations, observing standstill"
+            "error-state Kalman filter with Gauss–Newton iterations, which observes standstill"
         }
         None => "closed form with static positions",
     }
