@@ -28,7 +28,7 @@ pub struct ChiSquare {
 }
 
 impl ChiSquare {
-    /// χ² of a sum with its degrees of freedom; `None` without degrees of freedom.
+    /// χ² of a sum with its degrees of freedom; `None` if there are no degrees of freedom.
     pub fn new(value: f64, freedom: usize) -> Option<Self> {
         let p = ChiSquared::new(freedom as f64).ok()?.sf(value);
         Some(Self { value, freedom, p })

@@ -59,7 +59,7 @@ impl Recording {
 
     /// A recording of consecutive samples without a gap. The arguments are the start of the first sample, s; the length
     /// of each sample, s; and the integrals of the normalised output (see [`crate::imu::Nominal`]) over each sample,
-    /// rad and m/s along right-front-up.
+    /// rad and m/s along the right, front and up axes.
     ///
     /// # Errors [`SampleError`] if the triads differ in length, a number is not finite, or the period is not positive.
     pub fn from_samples(

@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 use packed::Packed;
 pub use packed::{Packer, finest_step};
 
-/// Increments of a triad along right-front-up, rad or m/s per sample.
+/// Increments of a triad along the right, front and up axes, rad or m/s per sample.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Series {
     whole: Vec<Vector3<f64>>,

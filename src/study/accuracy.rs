@@ -120,7 +120,7 @@ impl Accuracy {
         (self.study.form, self.study.scenario.installation.form)
     }
 
-    /// NIS over all runs for each kind of observation made.
+    /// NIS over all runs, for each kind of observation that was used.
     pub fn nis(&self) -> impl Iterator<Item = (&'static str, &Nis)> {
         let kinds = [
             ("zero velocity", &self.velocity),

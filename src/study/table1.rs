@@ -119,7 +119,7 @@ pub struct Row {
 }
 
 impl Column {
-    /// All rows; the stated reading first.
+    /// All rows, of which the first is that of the stated reading.
     pub fn rows(&self) -> impl Iterator<Item = &Row> {
         std::iter::once(&self.stated).chain(&self.others)
     }

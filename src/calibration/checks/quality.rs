@@ -62,7 +62,7 @@ pub struct Residuals {
 
 impl Residuals {
     /// Medians of the magnitudes: gravity residuals as a fraction of gravity, and direction residuals as a fraction of
-    /// a turn; `None` without residuals.
+    /// a turn; `None` if there are no residuals.
     pub fn middle(&self) -> [Option<f64>; 2] {
         let gravity = self
             .dwells

@@ -15,8 +15,7 @@ use crate::run::Run;
 /// The correction `u = (K C)⁻¹ (N − D) − t(q)` from a calibration file, in the file's quantity per second.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Correction {
-    /// `K C` of each triad: the file's quantity per second for one rad/s or m/s² along right, front
-    /// and up.
+    /// `K C` of each triad: the file's quantity per second for one rad/s or m/s² along the right, front and up axes.
     pub sensitivity: PerSensor<Matrix3<f64>>,
     /// `(K C)⁻¹`.
     pub matrix: PerSensor<Matrix3<f64>>,
@@ -28,7 +27,7 @@ pub struct Correction {
     changing: Option<Box<Calibration>>,
 }
 
-/// One sample, calibrated, along right, front and up of the calibration's body frame.
+/// One calibrated sample, along the right, front and up axes of the body frame of the calibration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Calibrated {
     /// Time at which the sample begins, s.

@@ -1,7 +1,7 @@
 //! A calibration as a file: `calibration.json` and `truth.json`.
 //!
 //! Values are in the file's quantity per second (see [`crate::imu::Nominal`]): `N = scale ⊙ (installation · u) + bias`,
-//! with `u` in rad/s or m/s² along right-front-up.
+//! with `u` in rad/s or m/s² along the right, front and up axes.
 
 pub(super) mod at_temperature;
 pub(super) mod correction;
@@ -84,7 +84,8 @@ pub struct Calibration {
     /// `table.base.up`, in rad), by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub terms: BTreeMap<String, TermRecord>,
-    /// Temperature dependence; the values apply at the reference temperature. `None` without temperature dependence.
+    /// Temperature dependence; the values apply at the reference temperature. `None` if the parameters do not depend on
+    /// temperature.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature: Option<ThermalRecord>,
     /// Results of each recording, if there are several.

@@ -1,7 +1,7 @@
 //! IMU section of a KF-GINS configuration.
 //!
-//! The model from true to measured values, along front, right and down, is `n = (1 + s) u + b` axis by axis, with b in
-//! °/h and mGal, s in ppm. KF-GINS corrects by `u = (n − b) / (1 + s)`.
+//! The model from true to measured values, along the front, right and down axes, is `n = (1 + s) u + b` axis by axis,
+//! with b in °/h and mGal, s in ppm. KF-GINS corrects by `u = (n − b) / (1 + s)`.
 //!
 //! Source: the KF-GINS configuration file and its IMU compensation (GIEngine, i2Nav, Wuhan University).
 

@@ -28,7 +28,7 @@ pub struct ImuLog<'a> {
     pub axes: AxisOrder,
     pub stamp: TimeStamp,
     pub continuous: bool,
-    /// Scale factors along right-front-up.
+    /// Scale factors along the right, front and up axes.
     pub nominal: PerSensor<Nominal>,
     /// Largest magnitude of a row value.
     pub full_scale: PerSensor<Option<f64>>,
@@ -61,14 +61,14 @@ impl Layout {
         std::array::from_fn(|k| *log.full_scale.get(sensor(k)))
     }
 
-    /// The columns of a triad along right, front and up.
+    /// The columns of a triad along the right, front and up axes.
     pub fn columns(&self, sensor: Sensor) -> [usize; 3] {
         let first = 3 * sensor as usize;
         let along = |axis: usize| (first..first + 3).find(|&k| self.body_axes[k] == axis);
         [0, 1, 2].map(|axis| along(axis).unwrap_or(first + axis))
     }
 
-    /// The unit of the corresponding column that equals one rad or one m/s, along right, front and up.
+    /// The unit of the corresponding column that equals one rad or one m/s, along the right, front and up axes.
     pub fn body_nominal(&self, log: &ImuLog, sensor: Sensor) -> Vector3<f64> {
         let columns = self.columns(sensor);
         Vector3::from_fn(|axis, _| {

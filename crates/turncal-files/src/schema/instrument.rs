@@ -265,7 +265,8 @@ impl<'a> Fields<'a> {
         }
     }
 
-    /// The prior of a triad with this nominal scale, along right-front-up; wide defaults if not stated.
+    /// The prior of a triad with this nominal scale, along the right, front and up axes; wide defaults if it is not
+    /// stated.
     fn prior(&mut self, sensor: Sensor, nominal: Vector3<f64>) -> Result<Prior, FileError> {
         let (of, axes) = (self.run.imu.of(sensor), self.run.imu.axes());
         let bias_words = sensor.pick("bias ± 2 °/s", "bias ± 1 m/s²");

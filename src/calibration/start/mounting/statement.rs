@@ -13,7 +13,7 @@ use crate::units::DEGREE;
 /// An axis order in `run.toml` that the motion contradicts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mounting {
-    /// The correct order of the outputs of each triad, along right-front-up.
+    /// The correct order of the outputs of each triad, along the right, front and up axes.
     pub orders: PerSensor<AxisOrder>,
     /// Short description of the source of the evidence.
     pub known_from: &'static str,

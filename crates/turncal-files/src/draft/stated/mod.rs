@@ -97,7 +97,7 @@ impl Stated {
 /// Columns of a table that the user stated; the other columns are detected.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct StatedColumns {
-    /// Columns of each triad along right, front and up.
+    /// Columns of each triad along the right, front and up axes.
     pub triads: PerSensor<Option<[String; 3]>>,
     /// Time.
     pub time: Option<String>,
