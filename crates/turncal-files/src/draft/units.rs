@@ -30,7 +30,7 @@ pub struct Unit {
     pub is_shown: bool,
     /// Whether the rows are not whole numbers and do not fit any known unit.
     pub is_unfit: bool,
-    /// Scale of counts, if determined.
+    /// Scale of the counts, if it could be determined.
     pub scale: Option<Scale>,
 }
 

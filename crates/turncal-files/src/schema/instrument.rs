@@ -37,7 +37,7 @@ const WIDEST_BIAS: f64 = 1e6;
 /// Maximum angle error, ″.
 const HALF_TURN: f64 = 648_000.0;
 
-/// Content of a `run.toml` while reading; `notes` receives remarks on assumptions and fields without effect.
+/// Content of a `run.toml` that is being read; `notes` receives remarks on assumptions and on fields without effect.
 pub struct Fields<'a> {
     pub document: Document<'a>,
     pub run: &'a RunFile,

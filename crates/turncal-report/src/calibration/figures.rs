@@ -29,7 +29,7 @@ impl Report<'_> {
         plots
     }
 
-    /// The filter result, if it has a single time axis; the result of several recordings does not.
+    /// The filter result, if it has a single time axis; the result of several recordings has no single time axis.
     pub fn against_time(&self) -> Option<&Outcome> {
         self.outcome.filter(|outcome| outcome.alone.len() < 2)
     }
