@@ -52,12 +52,15 @@ const UNITS: [Row; 22] = [
 ];
 
 /// File units that `run.toml` lacks, as multiples of its units.
-const MULTIPLES: [(&str, f64, &[&str]); 5] = [
+const MULTIPLES: [(&str, f64, &[&str]); 8] = [
     ("m/s^2", 1e-2, &["cm/s2", "gal"]),
     ("m/s^2", 1e-3, &["mm/s2"]),
     ("rad/s", 1e-3, &["mrad/s"]),
     ("deg/s", 6.0, &["rpm"]),
     ("g", 1e-6, &["ug"]),
+    ("s", 60.0, &["min", "minute", "minutes"]),
+    ("s", 3600.0, &["hour", "hours"]),
+    ("s", 86_400.0, &["day", "days"]),
 ];
 
 /// Units of the rows of a triad: quantity of the file per second for one rad/s or m/s². A count does not imply a

@@ -16,7 +16,7 @@ use flate2::read::MultiGzDecoder;
 
 use super::data_file::DataFile;
 use super::rows::Rows;
-use heading::{Heading, Looks};
+use heading::{Heading, Looks, other_number};
 pub use kind::{RowKind, is_remark};
 use lines::{LONGEST, Line, Lines, Stop};
 use row::{LONGEST_FIELD, MOST_COLUMNS, Malformed, Row};
@@ -172,10 +172,7 @@ impl CsvFile {
         let clock = self.heading.clocks.get(column).copied().flatten();
         let number = match (clock, text.parse()) {
             (Some(clock), _) => clock.seconds(text),
-            (None, Err(_)) if self.heading.delimiter.leaves_commas() => {
-                text.replacen(',', ".", 1).parse().ok()
-            }
-            (None, number) => number.ok(),
+            (None, number) => number.ok().or_else(|| other_number(text)),
         };
         number.unwrap_or(f64::NAN)
     }
@@ -192,7 +189,12 @@ impl CsvFile {
 /// The error for a text whose first line shows another kind of file.
 fn not_rows(file: &DataFile, lines: &Lines, is_labelled: bool) -> Option<FileError> {
     let first = lines.ahead().next()?.text.trim_ascii_start();
+    let is_array = first.starts_with(b"[{") || first.trim_ascii_end() == b"[";
     let (found, advice) = match first.first()? {
+        b'[' if is_array => (
+            "a JSON array",
+            "Write each object in a line of its own, for example by jq -c '.[]' FILE > log.jsonl",
+        ),
         // Rows may be objects, one on each line.
         b'{' if first.len() == 1 || !is_labelled => (
             "JSON",
@@ -240,10 +242,10 @@ impl Rows for CsvFile {
             if let Some((labelled, stream, sample)) = &mut self.labelled {
                 match sample.add(labelled, stream, &mut line.text) {
                     Added::Complete => {}
-                    Added::Part => continue,
+                    Added::Part | Added::Other => continue,
                     Added::Nothing => {
-                        let is_row = labelled.knows(&line.text) || line.comment().is_some();
-                        if !is_row && self.left_out.rows > 0 && line.is_ended {
+                        let is_comment = line.comment().is_some();
+                        if !is_comment && self.left_out.rows > 0 && line.is_ended {
                             self.left_out.add(line);
                         }
                         continue;

@@ -40,8 +40,27 @@ impl Check {
         drop(activity);
         begun.deliver(&check::document(&run, &survey))?;
         if !self.delivery.json() {
-            tell!("\nnext: turncal calibrate {}", self.run.display());
+            tell!("\nnext: turncal calibrate {}", said_of_the_log().join(" "));
         }
         Ok(())
     }
+}
+
+/// The words of this command line that `calibrate` takes as well.
+fn said_of_the_log() -> Vec<String> {
+    let words = std::env::args().skip_while(|word| word != "check").skip(1);
+    let mut is_of_output = false;
+    let kept = words.filter(|word| {
+        let follows = std::mem::replace(&mut is_of_output, word == "-o" || word == "--output");
+        let is_output = word.starts_with("-o") || word.starts_with("--output") || word == "--force";
+        !follows && !is_output
+    });
+    let quoted = |word: String| {
+        if word.contains([' ', '\'', '"', '$', '*']) {
+            format!("'{}'", word.replace('\'', "'\\''"))
+        } else {
+            word
+        }
+    };
+    kept.map(quoted).collect()
 }

@@ -203,6 +203,16 @@ pub fn standing_time(sheet: &Sheet) -> Option<(&str, f64)> {
     Some((name.as_str(), *values.first()?))
 }
 
+/// The first column with the name of a time that falls from row to row.
+pub fn falling_time(sheet: &Sheet) -> Option<&str> {
+    let mut columns = sheet.names.iter().zip(&sheet.columns);
+    let falls = |(name, values): &(&String, &Vec<f64>)| {
+        let (_, back) = forward(values.iter().copied());
+        Name::of(name).is_time() > 1 && back >= FORWARD
+    };
+    columns.find(falls).map(|(name, _)| name.as_str())
+}
+
 fn is_numeric(sheet: &Sheet, column: usize) -> bool {
     let values = &sheet.columns[column];
     let numbers = values.iter().filter(|value| value.is_finite()).count();

@@ -92,10 +92,14 @@ impl Draft {
     pub(crate) fn doubts(&self) -> impl Iterator<Item = String> + '_ {
         let of_units = Sensor::ALL.into_iter().filter_map(|sensor| {
             let unit = self.quantities.units.get(sensor);
-            let scale = unit.scale.as_ref().filter(|_| unit.is_unfit)?;
-            let (name, why, found) = (sensor.name(), &unit.why, &scale.why);
+            let (name, why) = (sensor.name(), &unit.why);
+            let found = match (&unit.scale, unit.word) {
+                _ if !unit.is_unfit => return None,
+                (Some(scale), _) => format!("estimated {}", scale.why),
+                (None, word) => format!("used {}", word?),
+            };
             Some(format!(
-                "The unit of the {name} rows is uncertain: {why}. turncal estimated {found}. Check --rate, and state \
+                "The unit of the {name} rows is uncertain: {why}. turncal {found}. Check --rate, and state \
                  --{name}-unit."
             ))
         });
@@ -151,7 +155,9 @@ impl Draft {
         let names = triad.map(|k| self.columns.names[k].as_str()).join(" ");
         let certainty = match unit.word {
             None => Certainty::Unknown,
-            Some(_) if unit.is_shown && self.columns.doubt.is_none() => Certainty::Certain,
+            Some(_) if unit.is_shown && !unit.is_unfit && self.columns.doubt.is_none() => {
+                Certainty::Certain
+            }
             Some(_) => Certainty::Guess,
         };
         let mut value = format!("{names}, {}", unit.word.unwrap_or("unit unknown"));

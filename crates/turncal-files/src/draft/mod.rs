@@ -216,7 +216,7 @@ impl Draft {
         } else {
             rates.agreed(clock)
         };
-        let contradiction = contradiction.or_else(|| standing_still(&sheet, &clock));
+        let contradiction = contradiction.or_else(|| no_time(&sheet, &columns, &clock));
         let rows = rates.rows(&clock);
         let down = rows.as_ref().and_then(RawSamples::points_down);
         let mut draft = Self {
@@ -336,8 +336,15 @@ pub fn turned_angle(triads: PerSensor<Vec<Vector3<f64>>>, period: f64) -> Option
     RawSamples::new(triads, Vec::new(), period).motion().angle
 }
 
-/// Evidence, statement and remedy if the only time never changes.
-fn standing_still(sheet: &Sheet, clock: &Clock) -> Option<[String; 3]> {
+/// Evidence, statement and remedy if the only time never changes or falls.
+fn no_time(sheet: &Sheet, columns: &Columns, clock: &Clock) -> Option<[String; 3]> {
+    if let Some(name) = columns::falling_time(sheet).filter(|_| columns.time.is_none()) {
+        return Some([
+            format!("times in the column `{name}` that fall from row to row"),
+            "times that increase".to_owned(),
+            "The newest row is first: reverse the rows below the names.".to_owned(),
+        ]);
+    }
     let (name, value) = columns::standing_time(sheet).filter(|_| clock.period.is_none())?;
     Some([
         format!("{value} in all rows of the column `{name}`"),

@@ -28,8 +28,8 @@ const TRIADS: [(Sensor, &[&str], &[&str]); 2] = [
 ];
 /// Parts of the names of other columns.
 #[rustfmt::skip]
-const OTHERS: [&str; 9] =
-    ["mag", "compass", "quat", "euler", "cov", "std", "bias", "orientation", "useracc"];
+const OTHERS: [&str; 10] =
+    ["mag", "compass", "quat", "euler", "cov", "std", "bias", "orientation", "useracc", "gravity"];
 
 /// A parsed name.
 #[derive(Debug, Clone, PartialEq)]
@@ -202,6 +202,11 @@ impl Name {
             "i", "id", "instance", "imu", "imuid", "device", "deviceid", "sensorid",
         ];
         names.contains(&&*self.whole())
+    }
+
+    /// Whether the column counts the ticks of a clock.
+    pub fn is_in_ticks(&self) -> bool {
+        self.whole().contains("tick")
     }
 
     /// Duration of a tick in s, if the name defines it.

@@ -439,7 +439,12 @@ fn tagged(file: &DataFile) -> Result<Vec<Member>, FileError> {
         }
         Ok(member)
     };
-    CsvFile::tags(file)?.into_iter().map(of_tag).collect()
+    // Rows that only comment on others need not be regular.
+    let members = CsvFile::tags(file)?.into_iter().map(of_tag);
+    let (read, refused): (Vec<_>, Vec<_>) = members.partition(Result::is_ok);
+    if read.is_empty() { refused } else { read }
+        .into_iter()
+        .collect()
 }
 
 /// Rows of a text as a stream.

@@ -1,5 +1,6 @@
 //! The clock of a log.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use super::columns::Columns;
@@ -15,6 +16,9 @@ use turncal_logs::clock::Uniform;
 pub const PERIODS: std::ops::Range<f64> = 2e-4..0.2;
 /// Time steps and a stated rate agree if they differ by less than this factor.
 pub const STATED: f64 = 1.2;
+const DAY: f64 = 86_400.0;
+/// Most rows by which a row that comes late is out of order.
+const FARTHEST: f64 = 100.0;
 
 /// Certainty of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,6 +56,8 @@ pub struct Clock {
     pub is_stated: bool,
     /// Number of time steps that are longer than the usual step.
     pub gaps: Vec<Gap>,
+    /// Rows at which the clock was restarted.
+    pub restarts: Vec<usize>,
     /// Number of steps at which the time does not increase.
     pub repeated: usize,
     /// Mean step of the time column, in its unit.
@@ -82,7 +88,8 @@ impl Clock {
         let named = (name.unit).and_then(|unit| Some(unit.times * second(unit.word)?.1));
         let tick = name.tick().map(|tick| tick * steps.mean);
         let known = stated.or(tick.filter(|period| PERIODS.contains(period)));
-        let seconds = || units_of_time().map(|(_, second)| second);
+        // Spreadsheets count days.
+        let seconds = || units_of_time().map(|(_, second)| second).chain([DAY]);
         let usual = rounded(steps.mean, 6);
         let mut sigma = 0.0;
         let (second, why) = if columns.nanoseconds.is_some() {
@@ -107,6 +114,13 @@ impl Clock {
             let likely = seconds().find(is_usual).unwrap_or(1.0);
             (Some(likely), format!("steps of {usual}"))
         };
+        let is_open = named.is_none() && known.is_none() && name.is_in_ticks();
+        let doubt_of_ticks = is_open.then(|| {
+            format!(
+                "The length of a tick in the column `{}` is not stated. turncal assumed the most usual one. State --rate.",
+                sheet.names[column]
+            )
+        });
         let word = |second: f64| units_of_time().find(|of| (second / of.1 - 1.0).abs() < 1e-9);
         Self {
             unit: second.map_or("count".to_owned(), |second| match word(second) {
@@ -121,6 +135,7 @@ impl Clock {
             period: second.map(|second| steps.mean * second).or(stated),
             is_stated: second.is_none() && stated.is_some(),
             gaps: steps.gaps,
+            restarts: steps.restarts,
             repeated: steps.repeated,
             step: Some(steps.mean),
             sigma: if second.is_none() && stated.is_some() {
@@ -128,7 +143,7 @@ impl Clock {
             } else {
                 sigma
             },
-            doubt: None,
+            doubt: doubt_of_ticks,
         }
     }
 
@@ -178,11 +193,13 @@ impl Clock {
         }
     }
 
-    /// Indices of the samples that follow a gap longer than `seconds`.
+    /// Indices of the samples that follow a gap longer than `seconds`, or a restart of the clock.
     pub fn breaks(&self, rows: &[usize], period: f64, seconds: f64) -> Vec<usize> {
         let long = |gap: &&Gap| gap.missing * period > seconds;
-        let first = |gap: &Gap| rows.partition_point(|&row| row < gap.before);
-        self.gaps.iter().filter(long).map(first).collect()
+        let gaps = self.gaps.iter().filter(long).map(|gap| gap.before);
+        let all: BTreeSet<usize> = gaps.chain(self.restarts.iter().copied()).collect();
+        let first = |before: usize| rows.partition_point(|&row| row < before);
+        all.into_iter().map(first).collect()
     }
 
     /// Evidence, stated value and remedy, if the steps of a time column contradict a stated rate.
@@ -206,6 +223,7 @@ impl Clock {
             period,
             is_stated: period.is_some(),
             gaps: Vec::new(),
+            restarts: Vec::new(),
             repeated: 0,
             step: None,
             sigma: period.map_or(0.0, |_| RATE_SIGMA),
@@ -232,6 +250,7 @@ struct Steps {
     /// Whether steps are whole numbers, mostly one.
     is_count: bool,
     gaps: Vec<Gap>,
+    pub restarts: Vec<usize>,
     repeated: usize,
 }
 
@@ -252,6 +271,8 @@ impl Steps {
         let clock = || Uniform::new(Path::new(""), &rows, None).ok();
         let clock = (!forward.is_empty()).then(clock).flatten();
         let numbers = clock.as_ref().map_or(&[][..], |clock| &clock.numbers);
+        // Rows out of order are close to one another.
+        let is_restart = |(_, step): &(usize, f64)| *step < -FARTHEST * usual;
         let gap = |(row, pair): (usize, &[usize])| {
             let missing = pair[1].saturating_sub(pair[0] + 1) as f64;
             (missing > 0.0).then_some(Gap {
@@ -264,6 +285,11 @@ impl Steps {
             is_count: usual == 1.0 && is_whole,
             is_whole,
             gaps: numbers.windows(2).enumerate().filter_map(gap).collect(),
+            restarts: (1..)
+                .zip(steps())
+                .filter(is_restart)
+                .map(|(row, _)| row)
+                .collect(),
             repeated,
         }
     }

@@ -28,7 +28,7 @@ pub struct Unit {
     pub why: String,
     /// Whether the unit is confirmed by motion or stated by the user.
     pub is_shown: bool,
-    /// Whether the rows are not whole numbers and do not fit any known unit.
+    /// Whether the rows fit no known unit, or fit a unit other than the one stated in the file.
     pub is_unfit: bool,
     /// Scale of the counts, if it could be determined.
     pub scale: Option<Scale>,
@@ -135,9 +135,13 @@ impl Quantities {
         if sensor == Sensor::Accel {
             self.hold(chosen.output, rows);
         }
+        // Gravity alone overrules a stated unit of accelerometers; turns need the clock as well.
+        let is_overruled =
+            sensor == Sensor::Gyro && by_name.is_some_and(|of| of.word != chosen.word);
         Unit {
             word: Some(chosen.word),
             is_shown: chosen.fits(),
+            is_unfit: is_overruled,
             ..Unit::open(&why)
         }
     }

@@ -66,14 +66,16 @@ struct Look {
 
 impl Look {
     fn of(line: &Line) -> Self {
-        let comment = line.comment();
+        // A mark with a separator behind it is the name of the first column.
+        let is_inside = |of: &&[u8]| !matches!(of.first(), Some(b',' | b';' | b'\t'));
+        let comment = line.comment().filter(is_inside);
         let text = text_of(comment.unwrap_or(&line.text));
         // Tabs may stand for fields without a value.
         let text = text.trim_matches(' ').to_owned();
         let delimiter = Delimiter::of_row(&text);
         Self {
             number: line.number,
-            is_comment: comment.is_some(),
+            is_comment: line.comment().is_some(),
             delimiter,
             fields: delimiter.fields(&text),
             text,
@@ -222,8 +224,7 @@ impl Looks {
                         text,
                     })
                 }
-                Added::Part => None,
-                Added::Nothing if labelled.knows(&line.text) => None,
+                Added::Part | Added::Other => None,
                 Added::Nothing => Some(Look::of(line)),
             }
         });
@@ -377,7 +378,9 @@ impl Looks {
             return Err(stop);
         }
         let fields = shape.delimiter.fields(&look.text).unwrap_or_default();
+        let is_word = |field: &String| field.contains(char::is_alphanumeric) || field.is_empty();
         let is_near = fields.len() > 2
+            && fields.iter().all(is_word)
             && (shape.delimiter != Delimiter::Blanks || fields.len().abs_diff(columns) < 2);
         let has_numbers = fields.iter().any(|field| is_number(field));
         Ok(match look.fields(shape.delimiter, columns) {
@@ -585,7 +588,16 @@ fn text_of(bytes: &[u8]) -> String {
 /// Whether a field is a number, with a point or a comma.
 fn is_number(field: &str) -> bool {
     // A comma after the last digit separates fields.
-    !field.ends_with(',') && field.replacen(',', ".", 1).parse::<f64>().is_ok()
+    !field.ends_with(',') && (field.parse::<f64>().is_ok() || other_number(field).is_some())
+}
+
+/// A number with a decimal comma, or with an exponent as in Fortran.
+pub fn other_number(text: &str) -> Option<f64> {
+    let is_digit = |c: char| c.is_ascii_digit() || "+-.,dDeE".contains(c);
+    let has_digit = text.contains(|c: char| c.is_ascii_digit());
+    (has_digit && text.chars().all(is_digit)).then_some(())?;
+    let text = text.replacen(',', ".", 1).replacen(['d', 'D'], "e", 1);
+    text.parse().ok()
 }
 
 /// Field separator of a row.
