@@ -91,8 +91,8 @@ mod tests {
         let said = notes(&imu);
         assert!(
             said[0].starts_with(
-                "From line 2001 (20.01 s) to 39.98 s the row interval is 30.000 ms instead of 10.000 ms: turncal \
-                 interpolated the samples in between, but attitude and velocity restart at 499 of 666 places"
+                "From line 2001 (20.01 s) to 39.98 s, the interval between rows is 30.000 ms instead of 10.000 ms: \
+                 turncal interpolated the missing samples, but attitude and velocity restart in 499 of 666 places"
             ),
             "{said:?}"
         );
