@@ -119,7 +119,7 @@ pub fn explained(all: &[TermEvidence]) -> Table {
     let rows = [estimated, others].map(|terms| terms.into_iter().map(row));
     Table::new(
         "Evidence for each error term",
-        columns("term | present | σ grows | shown by this path"),
+        columns("term | present | σ ratio | shown by this path"),
     )
     .sections(rows)
     .note(
@@ -128,7 +128,7 @@ pub fn explained(all: &[TermEvidence]) -> Table {
          probabilities.",
     )
     .note(
-        "σ grows: σ with the term divided by σ without it, RMS over the parameters of the group with the largest \
+        "σ ratio: σ with the term divided by σ without it, RMS over the parameters of the group with the largest \
          ratio.",
     )
     .note(
@@ -153,7 +153,7 @@ fn presence(present: f64) -> String {
     }
 }
 
-/// The group whose σ grows most; a dash if none grows visibly.
+/// The group whose σ ratio most; a dash if none grows visibly.
 fn growth(of: &TermEvidence) -> String {
     let groups = Group::all().zip(of.sigma_factors);
     let grown = groups.filter_map(|(group, factor)| Some((group, factor?)));
