@@ -153,7 +153,7 @@ fn presence(present: f64) -> String {
     }
 }
 
-/// The group whose σ ratio most; a dash if none grows visibly.
+/// The group whose σ grows most; a dash if no σ grows visibly.
 fn growth(of: &TermEvidence) -> String {
     let groups = Group::all().zip(of.sigma_factors);
     let grown = groups.filter_map(|(group, factor)| Some((group, factor?)));

@@ -140,7 +140,7 @@ fn of_triad(analysis: &NoiseAnalysis, sensor: Sensor) -> Vec<Field> {
     let comment = "1σ of a Gauss–Markov process that was fitted to the deviations";
     fields.push((key, of.sigma / unit, comment.to_owned()));
     let open = if figures.correlation_is_open {
-        "the longest time that the recording can show; σ ratio with the square root of this time"
+        "the longest time that the recording can show; σ grows with the square root of this time"
     } else {
         ""
     };
