@@ -60,8 +60,8 @@ pub fn earth_rate_n(latitude: f64) -> Vector3<f64> {
     Vector3::new(0.0, ROTATION_RATE * c, ROTATION_RATE * s)
 }
 
-/// Radii of curvature of the ellipsoid in m. (Eq. 13 of the paper calls them polar and equatorial radius, but means the
-/// radii of the meridian and the prime vertical.)
+/// Radii of curvature of the ellipsoid in m. (Eq. 13 of the paper calls the radii polar and equatorial, but it means
+/// the radii of the meridian and of the prime vertical.)
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Curvature {
     /// Radius of curvature of the meridian, `R_M`, for motion north and south.
@@ -106,9 +106,10 @@ pub struct Site {
     pub height: f64,
     /// Magnitude of gravity in m/s², including the centrifugal part.
     pub gravity: f64,
-    /// 1σ in m/s². 1σ of gravity, m/s². The scale factors of all three accelerometers share the gravity error.
+    /// 1σ in m/s². 1σ of gravity, m/s². The scale factors of all three accelerometers share the error of gravity.
     pub gravity_sigma: f64,
-    /// Whether the site is known. If not, Earth rotation is zero with the σ given by [`Site::earth_rate_sigma`].
+    /// Whether the site is known. If the site is not known, Earth rotation is zero with the σ given by
+    /// [`Site::earth_rate_sigma`].
     #[serde(default = "known")]
     pub is_known: bool,
 }
@@ -131,7 +132,8 @@ const FREE_AIR: f64 = 0.3086 * MILLIGAL;
 const ANYWHERE: (f64, f64) = (9.806, 0.015);
 
 impl Site {
-    /// An unknown site on the Earth. Where a latitude is needed, the latitude with mean gravity is used.
+    /// An unknown site on the Earth. Where a latitude is needed, the latitude at which gravity has its mean value is
+    /// used.
     pub fn unknown() -> Self {
         let (gravity, gravity_sigma) = ANYWHERE;
         Self {
@@ -191,7 +193,7 @@ impl Site {
         }
     }
 
-    /// 1σ of each component of Earth rotation, rad/s: if the site is unknown, the direction of the rotation is
+    /// 1σ of each component of Earth rotation, rad/s; if the site is unknown, the direction of the rotation is
     /// arbitrary.
     pub fn earth_rate_sigma(&self) -> f64 {
         if self.is_known {

@@ -1,5 +1,5 @@
 //! Statements of a calibration laboratory about itself, its customer and the item. These statements are not derived
-//! from data; a certificate shows them.
+//! from data; they appear in the certificate.
 
 use serde::Deserialize;
 
@@ -149,10 +149,11 @@ impl DecisionRule {
         match self {
             Self::GuardBand => {
                 "guard band w = U (ILAC-G8): pass if the value is inside its limit by at least the expanded \
-                 uncertainty, fail if it is outside by at least that; between these, pass and fail are conditional"
+                 uncertainty, fail if it is outside its limit by at least the expanded uncertainty; otherwise the \
+                 pass or fail is conditional"
             }
             Self::SimpleAcceptance => {
-                "simple acceptance (ILAC-G8): pass if the value is within its limit, regardless of uncertainty"
+                "simple acceptance (ILAC-G8): pass if the value is within its limit, regardless of its uncertainty"
             }
         }
     }

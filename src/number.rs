@@ -1,4 +1,4 @@
-//! Number formatting, with digits up to the second significant digit of σ.
+//! Number formatting: values are printed up to the second significant digit of σ.
 
 use crate::units::{HOUR, MINUTE};
 

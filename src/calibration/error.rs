@@ -114,11 +114,11 @@ pub enum ComparisonError {
     Unit {
         /// The triad.
         sensor: Sensor,
-        /// The first record that states a unit.
+        /// Name of the first calibration that states a unit.
         name: String,
         /// Unit.
         expected: String,
-        /// The record that states another unit.
+        /// Name of the calibration that states a different unit.
         other: String,
         /// The other unit.
         found: String,

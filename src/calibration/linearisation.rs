@@ -25,12 +25,11 @@ pub struct Linearisation {
     pub terms: TermVector,
     /// Temperature dependence; zero if there is none.
     pub thermal: PerSensor<ThermalCoefficients>,
-    /// Deviation in each recording from the common parameters; zero for recordings beyond the end of the
-    /// list.
+    /// Deviation of each recording from the common parameters; zero for recordings that are not in the list.
     pub own: Vec<Difference>,
     /// `C_b_n` at the first sample of each stretch.
     pub initial_attitudes: Vec<Matrix3<f64>>,
-    /// `C_b_n` at the beginning of each dwell, whatever the table reads; empty in the first pass.
+    /// `C_b_n` at the beginning of each dwell, regardless of the table reading; empty in the first pass.
     pub dwells: Vec<Matrix3<f64>>,
 }
 

@@ -1,7 +1,7 @@
 //! Calibration: closed form, coarse start, chain of dwells with the sizes of all effects, and the checks of a result.
 //!
-//! A [`Problem`] takes runs and [`Options`]; [`estimate`] and [`six_position`] solve it; [`bound`] gives the Cramér–Rao
-//! bound. This module does not print, read files or draw.
+//! A [`Problem`] is made from runs and [`Options`]; [`estimate`] and [`six_position`] solve it; [`bound`] gives the
+//! Cramér–Rao bound. This module does not print, read files or draw.
 
 mod chain;
 mod checks;

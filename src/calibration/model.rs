@@ -44,13 +44,13 @@ pub struct Model {
     pub noise: PerSensor<Noise>,
     /// Noise added during moves.
     pub motion_noise: PerSensor<MotionNoise>,
-    /// White 1σ, at standstill, of the integral of each triad's output: attitude in rad, velocity in m/s; `None`: in
-    /// each stretch, the value stated in or estimated from its run.
+    /// 1σ, at standstill (white), of the integral of each triad's output: attitude in rad, velocity in m/s. With
+    /// `None`, each stretch uses the value that is stated in its run or estimated from it.
     pub standstill_sigma: PerSensor<Option<f64>>,
     /// Unwanted rotation of the body in dwells without a table: 1σ density of a random walk, rad/√s. The gyros sense
     /// this rotation, so it is not part of their noise.
     pub turning_at_rest: f64,
-    /// 1σ of each error-term parameter, with mean zero; 0 if a term is off.
+    /// 1σ of each parameter of an error term, whose prior mean is zero; 0 if the term is off.
     pub term_sigma: TermVector,
     /// Error terms that may be absent; the estimate averages over their sizes.
     pub may_have: Vec<ErrorTerm>,
@@ -212,8 +212,8 @@ impl Model {
         }
     }
 
-    /// Switches an error term on, with its usual σ unless the run states one. This has no effect if the run does not
-    /// support the term.
+    /// Switches an error term on; its σ is the usual one, unless the run states another σ. This has no effect if the
+    /// run does not support the term.
     pub fn switch_on(&mut self, term: ErrorTerm) {
         self.may_have.retain(|&of| of != term);
         if !self.has(term) && self.can_have(term) {

@@ -1,10 +1,10 @@
-//! Options of the estimation.
+//! Options for the estimation.
 
 use crate::calibration::{ErrorTerm, NoisePolicy};
 use crate::imu::InstallationForm;
 use crate::run::Aiding;
 
-/// Options of the estimation; the default suits most runs.
+/// Options for the estimation; the defaults suit most runs.
 ///
 /// ```
 /// use turncal::calibration::Options;
@@ -28,7 +28,7 @@ pub struct Options {
     pub auto_terms: bool,
     /// Noise policy.
     pub noise: NoisePolicy,
-    /// Convergence limit: the iterations end when no parameter moves by more than this, in σ.
+    /// Convergence limit: the iterations end when no parameter changes by more than this limit, in σ.
     pub converged_sigma: f64,
     /// Maximum number of passes over the recording.
     pub passes: usize,
@@ -75,8 +75,8 @@ impl Options {
         }
     }
 
-    /// Adds this error term, whatever the data indicate, with a wide σ unless the instrument or the table states
-    /// another σ.
+    /// Adds this error term, which is then estimated regardless of the data; its σ is wide unless the instrument or the
+    /// table states another σ.
     pub fn with(mut self, term: ErrorTerm) -> Self {
         self.terms.push(term);
         self

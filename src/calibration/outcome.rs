@@ -58,7 +58,7 @@ pub struct Outcome {
     pub linearised_at: Linearisation,
     /// All passes in order.
     pub passes: Vec<Pass>,
-    /// Whether the last pass moved no parameter by more than the limit.
+    /// Whether the last pass changed no parameter by more than the limit.
     pub converged: bool,
     /// Estimate and σ against time in the last pass.
     pub history: Vec<Epoch>,
@@ -160,8 +160,8 @@ impl Outcome {
         Verdict::of(&self.findings).word != Word::Failed
     }
 
-    /// Whether the run observed the heading: without the prior, opposite headings differ by more than 6
-    /// in χ².
+    /// Whether the run observed the heading, that is, whether opposite headings differ by more than 6 in χ² without the
+    /// prior.
     pub fn heading_observed(&self) -> bool {
         let information = |sigma: &Vector3<f64>| sigma.z.powi(-2);
         let Some(prior) = self.prior_attitudes.last() else {

@@ -7,7 +7,7 @@ use crate::calibration::CalibrationError;
 /// One pass over the recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pass {
-    /// The largest step of any parameter from the linearisation point, in σ.
+    /// The largest change of any parameter from the linearisation point, in σ.
     pub largest_step: f64,
     /// Sum of squared whitened innovations, plus the prior term.
     pub cost: f64,
@@ -24,7 +24,7 @@ pub const UNWATCHED: Progress<'static> = &|_| ControlFlow::Continue(());
 /// Reports a pass.
 ///
 /// # Errors
-/// [`CalibrationError::Stopped`] if the callback stops the work.
+/// Returns [`CalibrationError::Stopped`] if the callback stops the work.
 pub fn tell(progress: Progress, pass: &Pass) -> Result<(), CalibrationError> {
     match progress(pass) {
         ControlFlow::Continue(()) => Ok(()),

@@ -20,8 +20,8 @@ const INITIAL_VELOCITY: f64 = 1e-3;
 
 /// Runs of one instrument with the model to estimate.
 ///
-/// Dwells, moves and the schedule of observations are found once; estimate, tests, bound and quality share them. A copy
-/// with another [`Model`] is cheap.
+/// Dwells, moves and the schedule of observations are determined once, and are shared by estimate, tests, bound and
+/// quality. A copy with another [`Model`] is cheap.
 #[derive(Debug, Clone)]
 pub struct Problem<'a> {
     /// The estimated quantities with their prior.
@@ -62,8 +62,8 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// A copy with an additional run of the instrument. The priors of the instrument and of the table remain those of
-    /// the first run; each site has its own gravity.
+    /// A copy of the problem with an additional run of the instrument. The priors of the instrument and of the table
+    /// remain those of the first run; each site has its own gravity.
     pub fn and(&self, run: &'a Run) -> Self {
         let mut all = self.stretches.to_vec();
         all.extend(stretches(run, self.others.len() + 1, &self.model));

@@ -31,7 +31,7 @@ impl Problem<'_> {
     /// Solves the problem with a method; fails if the recording contradicts run.toml.
     ///
     /// # Errors
-    /// [`CalibrationError`] if the runs cannot give a calibration by this method.
+    /// Returns [`CalibrationError`] if the runs cannot give a calibration by this method.
     pub fn solve(&self, method: Method, progress: Progress) -> Result<Solution, CalibrationError> {
         let is_missing = |&sensor: &Sensor| {
             self.lacks(sensor) && (sensor == Sensor::Accel || !self.shows_gravity_alone())
@@ -102,7 +102,7 @@ impl Solution {
         self.outcome().is_none_or(|outcome| outcome.converged)
     }
 
-    /// Whether the solution may be used: the filter converged, and noise explains the residuals.
+    /// Whether the solution may be used, that is, whether the filter converged and noise explains the residuals.
     pub fn is_usable(&self) -> bool {
         match self {
             Self::Filter(outcome) => outcome.is_usable(),
@@ -113,7 +113,7 @@ impl Solution {
     /// Evaluates the residuals of gravity and turns, and the uncertainty budget.
     ///
     /// # Errors
-    /// [`CalibrationError`] if the problem is not the one of the solution.
+    /// Returns [`CalibrationError`] if the solution belongs to a different problem.
     pub fn assess(&self, problem: &Problem) -> Result<Assessment, CalibrationError> {
         match self {
             Self::Filter(outcome) => {

@@ -6,7 +6,7 @@ use super::{
     Triad, TriadVector,
 };
 
-/// An instrument as known from its data sheet and from experience.
+/// An instrument, described by the knowledge from its data sheet and from experience.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Instrument {
     /// Nominal scale of each triad: the file's quantity per second for one rad/s or m/s².
@@ -21,7 +21,7 @@ pub struct Instrument {
     pub noise_is_stated: PerSensor<bool>,
     /// Noise added during moves.
     pub motion_noise: PerSensor<MotionNoise>,
-    /// Prior 1σ of each error-term parameter, with mean zero; 0 if a term is off.
+    /// Prior 1σ of each parameter of an error term, whose prior mean is zero; 0 if the term is off.
     pub term_sigma: TermVector,
     /// Error terms that are stated to be absent.
     pub absent_terms: Vec<Term>,

@@ -42,8 +42,8 @@ pub struct GaussMarkov {
 /// velocity. Simulations do not generate this noise.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct MotionNoise {
-    /// Part of the noise that grows with the speed of a move, √s: 1σ divided by the root of ∫|ω − ω_ie|² dt or ∫|f +
-    /// g|² dt.
+    /// Part of the noise that grows with the speed of a move, √s: 1σ divided by the square root of ∫|ω − ω_ie|² dt or
+    /// ∫|f + g|² dt.
     pub by_motion: f64,
     /// Part of the noise that grows with the duration of a move, rad/√s or (m/s)/√s.
     pub by_duration: f64,
@@ -102,7 +102,7 @@ impl Noise {
     }
 }
 
-/// Draws a triad's noise, sample by sample.
+/// Generates the noise of a triad sample by sample.
 #[derive(Debug, Clone)]
 pub struct NoiseSource {
     noise: Noise,
@@ -139,8 +139,8 @@ impl NoiseSource {
     }
 }
 
-/// A pulse counter: the remainder of each sample is carried into the next, so the sum of all
-/// pulses stays within half a count of the integral.
+/// A pulse counter: the remainder of each sample is carried into the next one, so the sum of all pulses differs from
+/// the integral by at most half a count.
 #[derive(Debug, Clone, Default)]
 pub struct Pulses {
     carry: Vector3<f64>,

@@ -123,7 +123,7 @@ impl Triad {
 pub struct ThermalModel {
     /// Temperature range of each triad's polynomials.
     pub range: PerSensor<ThermalRange>,
-    /// Prior 1σ of every coefficient, with mean zero; 0 if the coefficient is off.
+    /// Prior 1σ of every coefficient, whose prior mean is zero; 0 if the coefficient is off.
     pub sigma: PerSensor<ThermalCoefficients>,
 }
 

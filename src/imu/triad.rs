@@ -1,4 +1,4 @@
-//! One triad: scale factors, misalignments and biases, with their prior.
+//! One triad: scale factors, misalignments and biases, and their prior.
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
@@ -74,8 +74,8 @@ impl Triad {
         self.sensitivity() * u + self.bias
     }
 
-    /// `∂N/∂θ_p = W_p [u; 1]` for every parameter: `N` is linear in the input and 1, so a 3×4 matrix holds the
-    /// derivative for any input. The derivatives are zero for parameters that the form does not have.
+    /// `∂N/∂θ_p = W_p [u; 1]` for every parameter: `N` is linear in `[u; 1]`, so one 3×4 matrix contains the derivative
+    /// for any input. The derivatives are zero for parameters that the form does not have.
     pub fn response(&self) -> [SMatrix<f64, 3, 4>; PARAMETERS] {
         let c = self.installation();
         let scale = Matrix3::from_diagonal(&self.scale);

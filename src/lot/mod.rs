@@ -45,8 +45,8 @@ pub struct Lot {
     pub nominal: PerSensor<Nominal>,
     /// Whether a run states nominal scales.
     pub nominal_is_stated: bool,
-    /// Relative 1σ of gravity, if all units were calibrated at one site and therefore share the gravity error. This σ
-    /// is part of each unit's σ and of the mean's σ, but not of the scatter.
+    /// Relative 1σ of gravity, if all units were calibrated at one site and therefore have the gravity error in common.
+    /// This σ is part of each unit's σ and of the mean's σ, but not of the scatter.
     pub shared_gravity: Option<f64>,
     /// Every quantity that at least two units have.
     pub statistics: Vec<Statistics>,
@@ -127,8 +127,8 @@ impl Lot {
         self.truth.as_ref().or(first)
     }
 
-    /// The value of another unit minus the value of the reference, with its 1σ, as if the data of both were independent
-    /// except for gravity.
+    /// The value of another unit minus the value of the reference, with its 1σ, assuming that the data of both are
+    /// independent except for gravity.
     pub fn difference(&self, row: &Row, quantity: Quantity) -> Option<Sample> {
         let reference = self.reference().filter(|from| !std::ptr::eq(*from, row));
         let (own, from) = (row.sample(quantity)?, reference?.sample(quantity)?);
@@ -217,7 +217,8 @@ fn usable<'a>(
     }
     match (calibrated.calibration.unit.as_ref(), output) {
         (Some(own), Some(common)) if own != common => Err(format!(
-            "outputs are `{}` and `{}`, but most calibrations have `{}` and `{}`. Give calibrations in one unit",
+            "the outputs are in `{}` and `{}`, but most calibrations have outputs in `{}` and `{}`. Give calibrations \
+             with the same units",
             own.gyro, own.accel, common.gyro, common.accel
         )),
         _ => Ok(calibrated),

@@ -1,9 +1,10 @@
 //! Scatter of values with their own σ.
 //!
-//! The value k is `μ + τ a + σ_k b` with standard normal a and b, where τ is the spread between units. With `w_k =
-//! 1/(τ² + σ_k²)` and the weighted mean `m`, `Q(τ²) = Σ w_k (x_k − m)²` follows χ² with n − 1 degrees of freedom at the
-//! true τ and decreases with τ². The estimate of τ is where Q is n − 1 (Paule, Mandel, *J. Res. NBS* 87, 1982, 377),
-//! and its interval ends where Q equals quantiles of χ² (Viechtbauer, *Statistics in Medicine* 26, 2007, 37).
+//! The value k is `μ + τ a + σ_k b` with standard normal a and b, where τ is the spread between units. With
+//! `w_k = 1/(τ² + σ_k²)` and the weighted mean `m`, `Q(τ²) = Σ w_k (x_k − m)²` follows χ² with n − 1 degrees of freedom
+//! at the true τ and decreases with τ². The estimate of τ is the value at which Q is n − 1 (Paule, Mandel, *J. Res.
+//! NBS* 87, 1982, 377), and its interval ends where Q equals quantiles of χ² (Viechtbauer, *Statistics in Medicine* 26,
+//! 2007, 37).
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -21,12 +22,13 @@ pub struct ChiSquare {
     pub value: f64,
     /// Degrees of freedom.
     pub freedom: usize,
-    /// Probability of a sum at least as large: near zero if the σ are too small, near one if the σ are too large.
+    /// Probability that the sum is at least as large; near zero if the σ are too small, near one if the σ are too
+    /// large.
     pub p: f64,
 }
 
 impl ChiSquare {
-    /// χ² of a sum with its degrees of freedom; `None` without degrees of freedom.
+    /// χ² of a sum with its degrees of freedom; `None` if there are no degrees of freedom.
     pub fn new(value: f64, freedom: usize) -> Option<Self> {
         let p = ChiSquared::new(freedom as f64).ok()?.sf(value);
         Some(Self { value, freedom, p })

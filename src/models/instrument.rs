@@ -26,7 +26,7 @@ pub struct Instrument {
     pub noise: PerSensor<Noise>,
     /// Variation between instruments of the grade before calibration.
     pub variation: PerSensor<Variation>,
-    /// 1σ of each error-term parameter, with mean zero; 0 for terms that the instrument does not have.
+    /// 1σ of each parameter of an error term, with a mean of zero; 0 for terms that the instrument does not have.
     pub term_sigma: TermVector,
     /// Error terms that are stated to be absent.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -114,7 +114,7 @@ impl InstallationModel {
     /// Finds and reads an installation.
     ///
     /// # Errors
-    /// If the model does not exist or is malformed.
+    /// Returns an error if the model does not exist or is malformed.
     pub fn load(name_or_path: &str, named_in: &Place) -> Result<Self, ModelError> {
         let file: InstallationFile = text(Room::Installation, name_or_path, named_in)?.parse()?;
         Ok(Self {
@@ -146,7 +146,7 @@ impl Instrument {
     /// Finds and reads an instrument.
     ///
     /// # Errors
-    /// If the model does not exist or is malformed.
+    /// Returns an error if the model does not exist or is malformed.
     pub fn load(name_or_path: &str, named_in: &Place) -> Result<Self, ModelError> {
         let text = text(Room::Imu, name_or_path, named_in)?;
         let InstrumentFile { gyro, accel, terms } = text.parse()?;

@@ -96,7 +96,7 @@ pub fn names(room: Room) -> impl Iterator<Item = &'static str> {
     room.embedded().map(|(name, _)| name)
 }
 
-/// Place from which a model is referred to, which determines how the name is resolved.
+/// Location from which a model is referred to, which determines how the name is resolved.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Place {
     /// The command line: the name is a path relative to the working directory, or an embedded name.
@@ -114,7 +114,7 @@ pub struct Text {
     pub text: String,
     /// File name used in messages.
     pub file: String,
-    /// Place that this model is, when it refers to other models.
+    /// Location of this model, from which its references to other models are resolved.
     pub place: Place,
 }
 
@@ -129,7 +129,7 @@ impl Text {
     /// The fields of the model.
     ///
     /// # Errors
-    /// If a field is missing, unknown or cannot be right.
+    /// Returns an error if a field is missing, unknown or cannot be right.
     pub fn parse<T: DeserializeOwned>(&self) -> Result<T, ModelError> {
         let document = self.document();
         Ok(document.fill(document.parse()?)?)
@@ -162,7 +162,7 @@ pub fn inconsistent(file: &str, message: impl Into<String>) -> ModelError {
 /// Finds a model: the file at `name_or_path` if it exists, otherwise the embedded model with that name.
 ///
 /// # Errors
-/// If there is no file or embedded model of this name, or the file cannot be read.
+/// Returns an error if there is no file or embedded model of this name, or the file cannot be read.
 pub fn text(room: Room, name_or_path: &str, named_in: &Place) -> Result<Text, ModelError> {
     let path = match named_in {
         Place::CommandLine => Some(PathBuf::from(name_or_path)),

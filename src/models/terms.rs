@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::imu::{Term, TermVector};
 use turncal_input::{Document, FileError, NonNegative};
 
-/// 1σ of each parameter of an error term, with mean zero; 0 if the instrument is known not to have the term.
+/// 1σ of each parameter of an error term, whose mean is zero; 0 if the instrument is known not to have the term.
 #[derive(Clone, Copy, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TermFile {

@@ -57,7 +57,8 @@ pub struct Block {
     /// Transition from the parameter errors of enabled error terms.
     pub terms: Vec<TermColumn>,
     /// Functions of temperature in the block. The transition from the error of a coefficient is the transition from the
-    /// error of its parameter, times its function. `None` if parameters do not depend on temperature.
+    /// error of its parameter, multiplied by the temperature function. `None` if parameters do not depend on
+    /// temperature.
     pub thermal: Option<Box<ThermalState>>,
     /// Inputs of process noise, from which its covariance follows for any densities.
     pub noise: NoiseInputs,

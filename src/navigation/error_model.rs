@@ -43,8 +43,8 @@ pub type InputMatrix = SMatrix<f64, STATES, INPUTS>;
 ///   radius.
 /// * The brackets in `δV̇` and `φ̇` are errors of the sensed quantity, `û − u`, not `û`; ε and ∇ at the end of the
 ///   lines denote the same errors and must not be counted twice.
-/// * `V × (2δω_ie + δω_en)` belongs to `δV̇` as printed; the change of gravity with height and latitude, which is not
-///   printed, is added. Without this change, a free height would not be unstable.
+/// * As printed, `V × (2δω_ie + δω_en)` belongs to `δV̇`. The change of gravity with height and latitude, which is not
+///   printed, is added; without this term, a free height would not be unstable.
 ///
 /// The linear model neglects that a vertical error of specific force changes the period of the Schuler oscillation,
 /// even if the height is fixed: after a time t the phase error is `ω_s t ∇_U / 2g`, one degree in 40 h for 0.2 mg.
@@ -159,7 +159,8 @@ fn transport_slopes(truth: &Solution, transport: &Vector3<f64>) -> (Matrix3<f64>
     (by_velocity, by_position)
 }
 
-/// The error model over a step: `x ← Φ x + Γ ε`; the same for sensitivities to constants, with `∂ε/∂θ` for ε.
+/// The error model over a step: `x ← Φ x + Γ ε`. Sensitivities to constants obey the same equation, with `∂ε/∂θ` in
+/// place of ε.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Transition {
     /// Φ.

@@ -116,7 +116,7 @@ impl Instant {
     }
 }
 
-/// Treatment of the height. The error of a free height grows by a factor of e in ten minutes.
+/// Treatment of the height. The error of a free height grows by a factor of e in every ten minutes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Height {
     /// Free height.
@@ -130,7 +130,7 @@ pub enum Height {
     },
 }
 
-/// Navigation came too close to a pole.
+/// Navigation comes too close to a pole.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 #[error(
     "navigation reached latitude {:.3}°, but the heading is undefined near a pole in East-North-Up: stay within \
@@ -160,7 +160,7 @@ impl Strapdown {
     /// Starts from a solution; every step is `period` seconds long.
     ///
     /// # Errors
-    /// If the start is too close to a pole.
+    /// Returns an error if the start is too close to a pole.
     pub fn new(start: Solution, period: f64) -> Result<Self, NearPole> {
         within_reach(start.latitude)?;
         Ok(Self {
@@ -178,7 +178,7 @@ impl Strapdown {
     /// Navigates through one step.
     ///
     /// # Errors
-    /// If the step leads too close to a pole; the solution is then unchanged.
+    /// Returns an error if the step leads too close to a pole; the solution is then unchanged.
     pub fn advance(&mut self, increments: &Increments, height: Height) -> Result<(), NearPole> {
         let (period, start) = (self.period, self.solution);
         let before = self.before.unwrap_or(*increments);

@@ -19,7 +19,7 @@ const LEAST_GLIDE: f64 = 2.0;
 /// Minimum total duration of all segments, s.
 const LEAST_ROUND: f64 = 1.0;
 
-/// A start and segments, which repeat.
+/// A start and segments that are repeated.
 ///
 /// The body points along its velocity: heading is the direction of the velocity, and pitch is its angle above the
 /// horizon.
@@ -60,7 +60,7 @@ impl Trajectory {
     /// A trajectory of these segments.
     ///
     /// # Errors
-    /// If the segments take no time or a climb is too steep.
+    /// Returns an error if the segments take no time or a climb is too steep.
     pub fn new(start: Start, banks: bool, segments: Vec<Segment>) -> Result<Self, TrajectoryError> {
         let trajectory = Self {
             start,

@@ -1,8 +1,8 @@
 //! The conventions for noise figures, and their users.
 //!
-//! Each row of the table contains a unit, its value in SI units, and the relation of the figure to the strength of the
-//! process. Densities are two-sided (IEEE Std 952): white noise of density N has `σ = N √rate` in samples at that rate.
-//! Sources: Kalibr, *IMU Noise Model* (wiki); PSINS, `imuerrset`; KF-GINS, its configuration file.
+//! Each row of the table contains a unit, its value in SI units, and the factor between the figure and the strength of
+//! the process. Densities are two-sided (IEEE Std 952): white noise of density N has `σ = N √rate` in samples at that
+//! rate. Sources: Kalibr, *IMU Noise Model* (wiki); PSINS, `imuerrset`; KF-GINS, its configuration file.
 
 use Scale::{Increments, Linear, Power, Samples};
 use serde::Serialize;
@@ -129,7 +129,7 @@ static QUANTITIES: [Quantity; 6] = [
         row("°/h/√h", Linear(DEG_PER_H / SQRT_H), "rate random walk: IEEE Std 952", &["deg/h1.5", "deg/h3/2"]),
         row("°/h/√s", Linear(DEG_PER_H), "rate random walk over one second", &[]),
         row("rad/s²/√Hz", Linear(1.0), "Kalibr `gyroscope_random_walk`; rad/s/√s", &["rad/s/sqrts"]),
-        row("°/s²/√Hz", Linear(DEGREE), "the same in degrees: logs of MEMS gyros; °/s/√s", &["deg/s/sqrts"]),
+        row("°/s²/√Hz", Linear(DEGREE), "rate random walk in degrees: logs of MEMS gyros; °/s/√s", &["deg/s/sqrts"]),
         row("°/s/√h", Linear(DEGREE / SQRT_H), "rate random walk over one hour", &[]),
         row("rad²/s³", Power(1.0), "power spectral density of the bias rate: Q of a Kalman filter", &[]),
     ] },
@@ -199,7 +199,7 @@ pub enum ConversionError {
         /// The unit, as given by the user.
         unit: String,
     },
-    /// The figure is per sample, but no sample rate is given.
+    /// The figure is noise per sample, but no sample rate is given.
     #[error(
         "`{unit}` is noise per sample, which needs the sample rate: add --rate with the rate in Hz"
     )]
@@ -209,11 +209,11 @@ pub enum ConversionError {
     },
 }
 
-/// Converts a figure into every convention of its quantity. With a sample rate in Hz, an ambiguous unit is
-/// interpreted as the noise of each sample; without, as a bias instability.
+/// Converts a figure into every convention of its quantity. With a sample rate in Hz, an ambiguous unit is interpreted
+/// as noise per sample; without a sample rate, as a bias instability.
 ///
 /// # Errors
-/// [`ConversionError`] if the unit is not known, or needs a rate.
+/// Returns [`ConversionError`] if the unit is not known, or needs a rate.
 pub fn convert(value: f64, unit: &str, rate: Option<f64>) -> Result<Conversion, ConversionError> {
     let wanted = normalised(unit);
     let matching = || all().filter(|(_, row)| row.names().any(|name| name == wanted));

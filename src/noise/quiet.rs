@@ -11,8 +11,8 @@ const SUMS: [f64; 5] = [0.25, 0.5, 1.0, 2.0, 4.0];
 const FIRST_THIRD: f64 = 0.430_727;
 
 /// Random walk of a triad, rad/√s or (m/s)/√s, from the quieter part of a recording: from second differences of sums,
-/// which are independent of bias and drift. The sums are made longer until these differences reach the size of a pulse.
-/// Rows that are rounded to one value have at least the noise of their rounding.
+/// which are independent of bias and drift. The sums are made longer until the differences reach the size of a pulse.
+/// Rows that are all rounded to one value have at least the noise of this rounding.
 pub fn white_noise(imu: &ImuSamples, sensor: Sensor) -> f64 {
     let pulse = *imu.pulse.get(sensor);
     let mut found = 0.0;

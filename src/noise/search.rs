@@ -48,8 +48,9 @@ impl Clusters {
     /// short or contain a zero. Averaged axes are treated as independent.
     ///
     /// At short cluster times, coarse pulses and the bandwidth of a sensor cause deviations that no process describes.
-    /// Up to half of the cluster times are dropped for this reason, and one octave more because a remainder may not be
-    /// significant. If the fit fails from every start of the curve, the whole curve is fitted with a misfit.
+    /// Up to half of the cluster times, and one additional octave because a remainder may not be significant, are
+    /// dropped for this reason. If the fit fails from every starting point of the curve, the whole curve is fitted with
+    /// a misfit.
     pub fn identify(&self, curves: &[&Curve]) -> Option<Identified> {
         let is_of_these = |of: &&Curve| of.variance.len() == self.sizes().len();
         if !curves.iter().all(is_of_these) {

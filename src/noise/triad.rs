@@ -21,8 +21,9 @@ const PEAK: f64 = 1.89;
 pub struct TriadNoise {
     /// Noise of the axes x, y, z.
     pub axes: [AxisNoise; 3],
-    /// Noise from the mean Allan variance of all axes that vary. If the axes are alike, the mean resolves more
-    /// processes than each axis alone. Processes found on all axes are kept within the range of the axes.
+    /// Noise from the mean Allan variance of all axes that vary. If the axes are alike, the mean shows more processes
+    /// than the individual axes. Strengths of processes that are found on all axes are kept within the range of the
+    /// axes.
     pub mean: AxisNoise,
 }
 
@@ -147,8 +148,8 @@ fn knocks(values: &[f64]) -> usize {
 }
 
 /// Result for the mean of several axes, with every process found on all axes. Figures of the mean are kept if they lie
-/// within the range of the axes; otherwise the root mean square of the axes replaces them. The mean separates processes
-/// better, but a process that is found only in the mean reduces the other processes.
+/// within the range of the axes; otherwise they are replaced by the root mean square of the axes. The mean separates
+/// processes better, but a process that is found only in the mean makes the other processes weaker.
 pub fn within(mut mean: Identified, axes: &[&Identified]) -> Identified {
     if axes.is_empty() {
         return mean;

@@ -41,8 +41,8 @@ pub struct NamedColumns {
 }
 
 impl NamedColumns {
-    /// The columns of both triads along right, front and up of the body, with a minus sign if the sign is reversed;
-    /// `None` if a triad was not recorded.
+    /// The columns of both triads along the right, front and up axes of the body, with a minus sign if the sign is
+    /// reversed; `None` if a triad was not recorded.
     pub fn along_body(&self) -> Option<PerSensor<[String; 3]>> {
         let of = |sensor: Sensor| {
             [0, 1, 2].map(|axis| {

@@ -59,7 +59,7 @@ impl Recording {
 
     /// A recording of consecutive samples without a gap. The arguments are the start of the first sample, s; the length
     /// of each sample, s; and the integrals of the normalised output (see [`crate::imu::Nominal`]) over each sample,
-    /// rad and m/s along right-front-up.
+    /// rad and m/s along the right, front and up axes.
     ///
     /// # Errors [`SampleError`] if the triads differ in length, a number is not finite, or the period is not positive.
     pub fn from_samples(
@@ -73,7 +73,7 @@ impl Recording {
         Ok(Self::of(name, imu))
     }
 
-    /// Uses the name of the recording, such as `x_up`, as the label of a position.
+    /// Uses the name of the recording, such as `x_up`, as the label of its position.
     pub fn label_by_name(&mut self) {
         let (imu, label) = (&self.imu, self.name.to_lowercase());
         let axes = imu

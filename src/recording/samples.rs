@@ -38,11 +38,11 @@ pub struct ImuSamples {
     pub log: Option<LogFacts>,
 }
 
-/// Fewest samples of a recording; with fewer, dwells and turns cannot be distinguished.
+/// Fewest samples of a recording; with fewer samples, dwells and turns cannot be distinguished.
 pub const FEWEST_SAMPLES: usize = 100;
 
 impl ImuSamples {
-    /// Whether each sample is the mean output in one position, as in a table of six means.
+    /// Whether each sample is the mean output in one position, as in a table of the mean outputs in six positions.
     pub fn is_of_means(&self) -> bool {
         !self.continuous && self.len() < FEWEST_SAMPLES
     }
@@ -80,7 +80,7 @@ pub enum SampleError {
     /// A number is not finite.
     #[error("sample {sample} is not finite; remove it, or split the recording there")]
     NotFinite {
-        /// The first sample with such a number.
+        /// The first sample that contains a non-finite number.
         sample: usize,
     },
     /// An invalid period.
@@ -118,7 +118,7 @@ impl ImuSamples {
     /// Consecutive samples without a gap; the first begins at `start`, s.
     ///
     /// # Errors
-    /// [`SampleError`], as in [`super::Recording::from_samples`].
+    /// Returns [`SampleError`], as in [`super::Recording::from_samples`].
     pub fn new(
         start: f64,
         period: f64,
@@ -225,8 +225,8 @@ impl ImuSamples {
             })
     }
 
-    /// A time as a real number of samples from the first one. If two stretches are farther apart in time than in
-    /// samples, times after all lost samples between them map to the last lost sample.
+    /// A time as a real number of samples from the first one. If the time between two stretches is longer than the
+    /// number of lost samples explains, times after all lost samples between them are mapped to the last lost sample.
     pub fn edge(&self, time: f64) -> f64 {
         let begun = self.stretches.partition_point(|s| s.start <= time);
         let stretch = self.stretches.get(begun.saturating_sub(1));

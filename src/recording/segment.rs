@@ -25,12 +25,13 @@ pub struct Segment {
 /// Motion of a section according to its label.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum LabelledMotion {
-    /// `z_down`: the instrument is at rest, and this direction along right-front-up points up.
+    /// `z_down`: the instrument is at rest, and this direction, given in right-front-up axes, points up.
     Stands {
         /// Unit vector.
         up: Vector3<f64>,
     },
-    /// `rot_x-360`: the instrument is at rest, turns about this direction along right-front-up, and is at rest again.
+    /// `rot_x-360`: the instrument is at rest, turns about this direction, given in right-front-up axes, and is at rest
+    /// again.
     Turns {
         /// Unit vector.
         axis: Vector3<f64>,

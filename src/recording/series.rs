@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 use packed::Packed;
 pub use packed::{Packer, finest_step};
 
-/// Increments of a triad along right-front-up, rad or m/s per sample.
+/// Increments of a triad along the right, front and up axes, rad or m/s per sample.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Series {
     whole: Vec<Vector3<f64>>,
@@ -32,7 +32,8 @@ impl Series {
         self.len() == 0
     }
 
-    /// Whether the increments are packed, which makes reading slower; unpacking many at once takes memory.
+    /// Whether the increments are packed. Reading packed increments is slower, and unpacking many of them at once takes
+    /// memory.
     pub fn is_packed(&self) -> bool {
         self.packed.is_some()
     }

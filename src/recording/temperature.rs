@@ -31,7 +31,7 @@ struct Channel {
 
 impl Temperature {
     /// Temperatures in °C from means over consecutive spans of [`SPACING`], the first of which is centred on `start`;
-    /// `of` is the index of the sensor for each axis. `None` without values, or if an axis has no sensor.
+    /// `of` is the index of the sensor for each axis. `None` if there are no values, or if an axis has no sensor.
     pub fn new(start: f64, channels: Vec<Vec<f64>>, of: PerSensor<[usize; 3]>) -> Option<Self> {
         let has_values = |values: &Vec<f64>| !values.is_empty();
         let known = |&channel: &usize| channels.get(channel).is_some_and(has_values);

@@ -48,9 +48,9 @@ impl Line {
 }
 
 impl Run {
-    /// If all moves agree with one offset and one drift of the table clock, converts the times of the table readings to
-    /// the IMU clock, and returns a note that says so. It is unknown which of the two clocks drifts, so the drift is
-    /// treated as an error of the sample period.
+    /// If all moves are consistent with one offset and one drift of the table clock, converts the times of the table
+    /// readings to the IMU clock, and returns a note about this conversion. It is unknown which of the two clocks
+    /// drifts, so the drift is treated as an error of the sample period.
     pub fn align_table(&mut self) -> Option<String> {
         let table = self.recording.table.as_ref()?;
         if agree(self, &moves(self, table)) {
@@ -87,8 +87,9 @@ impl Line {
             ),
         };
         format!(
-            "The gyros turn {:.3} ± {:.3} s {way} than the table in all {moves} moves{drift}. turncal converted the \
-             times of the table log to the clock of the IMU. To avoid this step, convert both logs to the same clock.",
+            "In all {moves} moves, the gyros turn {:.3} ± {:.3} s {way} than the table{drift}. turncal converted the \
+             times of the table log to the clock of the IMU. To avoid this conversion, use the same clock in both \
+             logs.",
             offset.abs(),
             self.offset[1],
         )

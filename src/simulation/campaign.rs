@@ -44,7 +44,7 @@ impl SimulatedCampaign {
     /// Finds and reads a campaign, by embedded name or path, with the models that it refers to.
     ///
     /// # Errors
-    /// If one of these files does not exist or is malformed.
+    /// Returns an error if one of these files does not exist or is malformed.
     pub fn load(name_or_path: &str) -> Result<Self, ModelError> {
         let text = models::text(Room::Campaign, name_or_path, &Place::CommandLine)?;
         let file: CampaignFile = text.parse()?;
@@ -86,7 +86,7 @@ impl SimulatedCampaign {
     /// keeps the seed and increments the stream.
     ///
     /// # Errors
-    /// If the table cannot follow the path.
+    /// Returns an error if the table cannot follow the path.
     pub fn simulate(&self, seed: u64, stream: u64) -> Result<Vec<Simulated>, TableError> {
         let all = (0..).zip(&self.recordings);
         all.map(|(number, (name, chamber))| {

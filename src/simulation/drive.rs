@@ -45,7 +45,7 @@ impl Drive {
         })
     }
 
-    /// Whether the drive was made with this imperfection and these error terms.
+    /// Whether the drive was computed with these imperfections and these error terms.
     pub fn is_of(&self, imperfection: &Imperfection, terms: &TermVector) -> bool {
         (&self.imperfection, &self.terms) == (imperfection, terms)
     }

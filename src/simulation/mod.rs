@@ -41,7 +41,7 @@ use crate::turntable::{Imperfection, Moves, TableError};
 /// A run with its truth.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Simulated {
-    /// The run as a laboratory would record it.
+    /// The run, in the form in which a laboratory would record it.
     pub run: Run,
     /// The instrument's true parameters; if they depend on temperature, the values at the reference of
     /// [`Self::thermal`].
@@ -134,7 +134,7 @@ impl Scenario {
     /// and increments the stream.
     ///
     /// # Errors
-    /// If the table cannot follow the path.
+    /// Returns an error if the table cannot follow the path.
     pub fn simulate(&self, seed: u64, stream: u64) -> Result<Simulated, TableError> {
         self.simulate_recording(seed, stream, stream, &Difference::default())
     }
@@ -143,7 +143,7 @@ impl Scenario {
     /// another stream; `own` contains the differences of the parameters in this recording.
     ///
     /// # Errors
-    /// If the table cannot follow the path.
+    /// Returns an error if the table cannot follow the path.
     pub fn simulate_recording(
         &self,
         seed: u64,

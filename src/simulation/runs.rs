@@ -17,7 +17,7 @@ impl Runs {
     /// The runs of a scenario.
     ///
     /// # Errors
-    /// If the table cannot follow the path.
+    /// Returns an error if the table cannot follow the path.
     pub fn new(scenario: &Scenario) -> Result<Self, TableError> {
         let none = Imperfection::none(&scenario.table);
         Ok(Self {
@@ -29,7 +29,7 @@ impl Runs {
     /// Simulates one run, as [`Scenario::simulate`] does.
     ///
     /// # Errors
-    /// If the table cannot follow the path.
+    /// Returns an error if the table cannot follow the path.
     pub fn simulate(&self, seed: u64, stream: u64) -> Result<Simulated, TableError> {
         let own = Difference::default();
         let shared = Some(&self.perfect);

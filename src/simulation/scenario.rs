@@ -36,7 +36,7 @@ pub struct Scenario {
     pub installation: InstallationModel,
     /// The true body frame: in the accelerometer frame, the misalignment angles that this frame fixes are not drawn.
     pub body_frame: BodyFrame,
-    /// True values that are stated and not drawn at random.
+    /// True values that are stated instead of being drawn at random.
     pub given: PerSensor<Given>,
     /// The table.
     pub table: Table,
@@ -59,8 +59,8 @@ pub struct Scenario {
     pub seed: u64,
 }
 
-/// True values of a triad that a scenario states; other values are drawn at random. The prior is still the prior of the
-/// grade.
+/// True values of a triad that a scenario states; other values are drawn at random. The prior is still the prior for
+/// the grade.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Given {
     /// Scale factors − 1.
@@ -75,7 +75,7 @@ impl Scenario {
     /// Finds and reads a scenario, by embedded name or path, and the models that it refers to.
     ///
     /// # Errors
-    /// If one of the files does not exist or is malformed, or the files are not consistent.
+    /// Returns an error if one of the files does not exist or is malformed, or the files are not consistent.
     pub fn load(name_or_path: &str) -> Result<Self, ModelError> {
         let text = models::text(Room::Scenario, name_or_path, &Place::CommandLine)?;
         let file: ScenarioFile = text.parse()?;
@@ -120,7 +120,7 @@ impl Scenario {
     /// A copy with a different path, given by embedded name or file.
     ///
     /// # Errors
-    /// If the path does not exist, is malformed, or does not fit the table.
+    /// Returns an error if the path does not exist, is malformed, or does not fit the table.
     pub fn with_path(self, name_or_path: &str) -> Result<Self, ModelError> {
         let (path, name) = models::path(name_or_path, &Place::CommandLine, &self.site)?;
         let along = self.along(path, &name);
@@ -201,7 +201,7 @@ impl Scenario {
     /// Motion of a perfect table along the path.
     ///
     /// # Errors
-    /// If the table cannot follow the path.
+    /// Returns an error if the table cannot follow the path.
     pub fn motion(&self) -> Result<Motion, TableError> {
         Motion::new(&self.table, &self.path, &Imperfection::none(&self.table))
     }
@@ -209,7 +209,7 @@ impl Scenario {
     /// Duration of a run, s.
     ///
     /// # Errors
-    /// If the table cannot follow the path.
+    /// Returns an error if the table cannot follow the path.
     pub fn duration(&self) -> Result<f64, TableError> {
         Ok(self.motion()?.duration())
     }
@@ -217,7 +217,7 @@ impl Scenario {
     /// Total time of the dwells in a run, s.
     ///
     /// # Errors
-    /// If the table cannot follow the path.
+    /// Returns an error if the table cannot follow the path.
     pub fn standing_time(&self) -> Result<f64, TableError> {
         let motion = self.motion()?;
         Ok(motion.dwells().map(|(start, end)| end - start).sum())
@@ -237,7 +237,7 @@ impl Scenario {
             let number = duration * rate;
             if !(2.0..=MOST_SAMPLES).contains(&number) {
                 return Err(format!(
-                    "{duration:.1} s of path {} at {rate} Hz give {number:.3e} {what}, expected 2 to \
+                    "{duration:.1} s of path {} at {rate} Hz require {number:.3e} {what}, expected 2 to \
                      {MOST_SAMPLES:.0e}",
                     self.path_name
                 ));

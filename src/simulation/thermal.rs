@@ -1,4 +1,4 @@
-//! An instrument in a climatic chamber: its temperature against time, and its true parameters.
+//! An instrument in a climatic chamber: its temperature as a function of time, and its true parameters.
 
 use nalgebra::SVector;
 use rand_chacha::ChaCha8Rng;
@@ -69,7 +69,7 @@ impl Chamber {
     }
 }
 
-/// Temperature of an instrument every second.
+/// Temperature of an instrument at intervals of one second.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Warming {
     values: Vec<f64>,

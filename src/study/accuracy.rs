@@ -34,7 +34,8 @@ pub struct Accuracy {
     pub table_time: f64,
     /// Every run, in order.
     pub trials: Vec<Trial>,
-    /// Figures of each group that has a parameter to estimate, RMS over its parameters, in rad/s, m/s² or pure numbers.
+    /// Figures for each group with at least one estimated parameter, RMS over its parameters, in rad/s, m/s² or pure
+    /// numbers.
     pub groups: Vec<(Group, Figures)>,
     /// Navigation accuracy of the calibrations in each mission.
     pub navigation: Vec<NavigationAccuracy>,
@@ -119,7 +120,7 @@ impl Accuracy {
         (self.study.form, self.study.scenario.installation.form)
     }
 
-    /// NIS over all runs for each kind of observation made.
+    /// NIS over all runs, for each kind of observation that was used.
     pub fn nis(&self) -> impl Iterator<Item = (&'static str, &Nis)> {
         let kinds = [
             ("zero velocity", &self.velocity),

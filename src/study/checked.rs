@@ -1,4 +1,5 @@
-//! A calibration with its checks, and its consequences: accuracy predicted for the recording, and navigation errors.
+//! A calibration with its checks, the accuracy predicted for the recording, and the navigation errors that result from
+//! the calibration.
 
 use super::navigation::{MethodOutlook, NavigationStudyError, navigate_with_each};
 use crate::calibration::{Assessment, Calibration, CalibrationError, Problem, Solution};
@@ -30,7 +31,7 @@ impl CheckedCalibration {
     /// Checks a solution.
     ///
     /// # Errors
-    /// [`CalibrationError`] if the problem is not the one of the solution.
+    /// Returns [`CalibrationError`] if the solution belongs to a different problem.
     pub fn new(problem: &Problem, solution: Solution) -> Result<Self, CalibrationError> {
         let assessment = solution.assess(problem)?;
         let calibration = solution.calibration(problem, &assessment);

@@ -84,7 +84,7 @@ pub struct Navigated {
     pub situation: Situation,
     /// Results of each of [`Method::all`].
     pub methods: Vec<Worth>,
-    /// Horizontal position error at the end in nmile due to the noise of alignment and navigation alone, which is the
+    /// Horizontal position error at the end in nmile, caused only by the noise of alignment and navigation; it is the
     /// same after every calibration.
     pub noise: Spread,
 }
@@ -94,7 +94,7 @@ pub struct Navigated {
 pub struct Worth {
     /// The method.
     pub method: Method,
-    /// Errors at the end, in the order of the instruments that have a calibration.
+    /// Errors at the end, for all instruments that have a calibration, in the order of the instruments.
     pub errors: Vec<f64>,
     /// Distribution of the errors at the end.
     pub at_end: Spread,

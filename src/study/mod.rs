@@ -50,7 +50,7 @@ pub trait Study: Sync {
     /// The outcome of all runs, in the order of their numbers.
     ///
     /// # Errors
-    /// [`StudyError`] if the runs cannot be evaluated.
+    /// Returns [`StudyError`] if the runs cannot be evaluated.
     fn outcome(&self, trials: Vec<Self::Trial>) -> Result<Self::Outcome, StudyError>;
 
     /// Performs some of the runs on all cores; `done` is called after each and may stop the study.

@@ -55,7 +55,7 @@ impl Motion {
     /// of the trajectory.
     ///
     /// # Errors
-    /// [`ModelError`] if the trajectory cannot be read.
+    /// Returns [`ModelError`] if the trajectory cannot be read.
     pub fn along(
         name: &str,
         latitude: Option<f64>,
@@ -215,7 +215,7 @@ impl Mission {
     /// Navigates and returns the errors and their predicted covariance at the start and after each interval.
     ///
     /// # Errors
-    /// If the mission leads to a pole or the calibration is singular.
+    /// Returns an error if the mission leads to a pole or the calibration is singular.
     pub fn navigate(&self, pair: &Pair) -> Result<Vec<Outlook>, NavigationStudyError> {
         let mut moments = self.errors(pair)?;
         if let Some(covariance) = &pair.covariance {
@@ -234,10 +234,10 @@ impl Mission {
         self.errors_from(&ErrorVector::zeros(), pair)
     }
 
-    /// Does the same as [`Self::errors`], but starts with these errors.
+    /// Does the same as [`Self::errors`], but navigation starts with these errors.
     ///
     /// # Errors
-    /// As for [`Self::navigate`].
+    /// The same errors as [`Self::navigate`].
     pub fn errors_from(
         &self,
         start: &ErrorVector,
@@ -267,7 +267,7 @@ impl Mission {
     /// depends so little on the instrument that one result serves for a whole grade.
     ///
     /// # Errors
-    /// As for [`Self::navigate`].
+    /// The same errors as [`Self::navigate`].
     pub fn exposure(
         &self,
         truth: &PerSensor<Triad>,
@@ -278,7 +278,7 @@ impl Mission {
     /// Does the same as [`Self::exposure`], if the initial errors also depend on the parameters.
     ///
     /// # Errors
-    /// As for [`Self::navigate`].
+    /// The same errors as [`Self::navigate`].
     pub fn exposure_from(
         &self,
         mut sensitivity: Sensitivity,

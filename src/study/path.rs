@@ -60,7 +60,8 @@ pub struct Evaluation {
     pub navigation: Vec<Outlook>,
 }
 
-/// Accuracy of a calibration that lacks one move: attitude, velocity and position may change arbitrarily during it.
+/// Accuracy of a calibration without the information from one move: attitude, velocity and position may change
+/// arbitrarily during this move.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Without {
     /// Time of the move and the dwell after it, s.
@@ -140,7 +141,7 @@ impl PathStudy {
     /// Evaluates the path and each of its moves.
     ///
     /// # Errors
-    /// [`PathError`] if the table cannot follow the path, or no calibration is possible.
+    /// Returns [`PathError`] if the table cannot follow the path, or no calibration is possible.
     pub fn evaluate(&self) -> Result<Evaluation, PathError> {
         let motion = self.scenario.motion()?;
         let moves = motion.moves();
@@ -176,7 +177,7 @@ impl Evaluation {
     /// Expected results of the calibration of a run, linearised at the triads with which the filter would start.
     ///
     /// # Errors
-    /// [`PathError`] if no calibration is possible.
+    /// Returns [`PathError`] if no calibration is possible.
     pub fn of_run(run: &Run, options: &Options) -> Result<Self, PathError> {
         let problem = Problem::new(run, options);
         let start = coarse_start(&problem)?;

@@ -22,8 +22,8 @@ pub struct Shard {
 pub struct ShardError;
 
 impl Shard {
-    /// The numbers, from zero and in order, of the runs in this part of `count` runs. A part that was read from a file
-    /// may be invalid, in which case its runs may repeat endlessly.
+    /// The numbers, from zero and in order, of the runs in this part of `count` runs. If a part was read from a file,
+    /// it may be invalid; its runs may then repeat endlessly.
     pub fn runs(self, count: u64) -> impl Iterator<Item = u64> {
         let next = move |run: &u64| run.checked_add(self.of);
         std::iter::successors(self.index.checked_sub(1), next).take_while(move |run| *run < count)

@@ -32,7 +32,7 @@ pub use paper::{Installation, Kind, Reading};
 pub use quantity::{ByQuantity, Moments, QUANTITIES};
 pub use verdict::{AGREEMENT, Verdict};
 
-/// Minimum number of samples for verdicts, so that only the sampling error of the paper matters.
+/// Minimum number of samples for verdicts; with this number, only the sampling error of the paper matters.
 pub const POPULATION: usize = 4000;
 
 /// Number of times at which the errors of samples are stored.
@@ -78,7 +78,7 @@ pub enum Table1Error {
 pub struct Table1 {
     /// The configuration.
     pub study: Table1Study,
-    /// Number of samples for the verdicts; the first of them are the samples of the study.
+    /// Number of samples for the verdicts; the first of these samples are the samples of the study.
     pub population: usize,
     /// The columns of the paper, in the order of the paper.
     pub columns: Vec<Column>,
@@ -99,7 +99,8 @@ pub struct Column {
     pub courses: Courses,
 }
 
-/// Results for one column of the paper's table, under one interpretation of the paper. Errors in the usual units of [`QUANTITIES`].
+/// Results for one column of the table in the paper, under one interpretation of the paper. Errors in the usual units
+/// of [`QUANTITIES`].
 #[derive(Debug, Clone)]
 pub struct Row {
     /// The reading.
@@ -118,7 +119,7 @@ pub struct Row {
 }
 
 impl Column {
-    /// All rows; the stated reading first.
+    /// All rows, of which the first is that of the stated reading.
     pub fn rows(&self) -> impl Iterator<Item = &Row> {
         std::iter::once(&self.stated).chain(&self.others)
     }
@@ -146,7 +147,7 @@ impl Table1Study {
     /// Computes the table on all cores. The result does not depend on the number of cores.
     ///
     /// # Errors
-    /// [`Table1Error`] if the configuration is invalid.
+    /// Returns [`Table1Error`] if the configuration is invalid.
     pub fn run(&self) -> Result<Table1, Table1Error> {
         if self.samples < 2 {
             return Err(Table1Error::Samples(self.samples));

@@ -33,8 +33,8 @@ const PERIOD: f64 = 0.05;
 /// A move of the instrument, to be followed by a dwell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Move {
-    /// A move to the attitude in which this direction along right-front-up, which is an axis, an edge or a corner,
-    /// points up.
+    /// A move to the attitude in which this direction points up; the direction is given in right-front-up axes and is
+    /// an axis, an edge or a corner.
     Up(Vector3<f64>),
     /// Half a turn about this body axis, right-handed about the positive or negative axis.
     HalfTurn {
@@ -92,7 +92,7 @@ pub fn nearest_attitude(up: &Vector3<f64>) -> Attitude {
     nearest.unwrap_or([0, 0, 1])
 }
 
-/// Chooses moves. The information of moves is cached for each attitude at which they begin.
+/// Chooses moves. The information from each move is cached for each attitude at which the move begins.
 #[derive(Debug, Clone, Default)]
 pub struct Advisor {
     from: BTreeMap<Attitude, Vec<(Move, DMatrix<f64>)>>,

@@ -20,7 +20,7 @@ pub struct Attained {
 }
 
 impl Attained {
-    /// Whether a specification is given and it seems that every limit can be decided.
+    /// Whether a specification is given and, as far as can be predicted, every limit can be decided.
     pub fn is_met(&self) -> bool {
         are_decided(&self.checks)
     }

@@ -12,8 +12,8 @@ use crate::calibration::{
 use crate::lot::{self, Specification};
 use crate::run::Run;
 
-/// A recording is calibrated again after it has grown by this factor. All calibrations together then take at most three
-/// times as long as the last one.
+/// A recording is calibrated again after it has grown by this factor. Together, all calibrations then take at most
+/// three times as long as the last one.
 pub const GROWTH: f64 = 1.5;
 /// Spacing of the epochs of a history, s.
 const EPOCH: f64 = 1.0;
@@ -35,7 +35,7 @@ pub struct Status {
     pub next: Option<Move>,
 }
 
-/// A calibration of the rows so far. Only a calibration shows the actual noise, unmodelled errors and their σ.
+/// A calibration of the rows so far. Only a calibration shows the actual noise, unmodelled errors, and the resulting σ.
 #[derive(Debug, Clone)]
 pub struct InterimCalibration {
     /// Duration of the recording at the time of the calibration, s.
@@ -115,7 +115,8 @@ impl Evaluator {
         }
     }
 
-    /// The calibration that is due in this state: after every growth by half, and when every limit seems to be decided.
+    /// The calibration that is due in this state: a calibration is due each time the recording has grown by half, and
+    /// when every limit seems to be decided.
     pub fn due(&mut self, run: &Run, status: &Status) -> Option<Due> {
         let attained = status.expected.as_ref().ok()?;
         let seems_met = status.duration > self.attempted && attained.is_met();

@@ -175,7 +175,7 @@ impl Expected {
 /// recording shows at this point.
 ///
 /// # Errors
-/// [`CalibrationError`] if the recording cannot be calibrated.
+/// Returns [`CalibrationError`] if the recording cannot be calibrated.
 pub fn bound_of_record(run: &Run, options: &Options) -> Result<Bound, CalibrationError> {
     let problem = Problem::new(run, options);
     let start = coarse_start(&problem)?;

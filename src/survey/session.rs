@@ -53,8 +53,8 @@ impl Session {
     /// milliseconds, and as long as a calibration once the specification seems to be met.
     ///
     /// # Errors
-    /// [`SampleError`] if a number is not finite, the triads differ in length, or the period is not positive. If there
-    /// is an error, the samples are not added.
+    /// Returns [`SampleError`] if a number is not finite, the triads differ in length, or the period is not positive.
+    /// If there is an error, the samples are not added.
     pub fn push(
         &mut self,
         gyro: &[Vector3<f64>],
@@ -74,7 +74,7 @@ impl Session {
     /// The state with all samples so far.
     ///
     /// # Errors
-    /// [`SampleError`] if there are no samples.
+    /// Returns [`SampleError`] if there are no samples.
     pub fn status(&mut self) -> Result<Status, SampleError> {
         self.evaluated = self.gyro.len();
         let run = self.run()?;
@@ -84,7 +84,7 @@ impl Session {
     /// The run of all samples so far, ready for calibration.
     ///
     /// # Errors
-    /// [`SampleError`] if there are no samples.
+    /// Returns [`SampleError`] if there are no samples.
     pub fn run(&self) -> Result<Run, SampleError> {
         let (gyro, accel) = (self.gyro.clone(), self.accel.clone());
         let recording = Recording::from_samples("session", 0.0, self.period, gyro, accel)?;

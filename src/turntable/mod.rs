@@ -1,9 +1,9 @@
 //! A turntable, its path, and its attitude at any time.
 //!
-//! `C_b_n = C_base R(axis₁, a₁) R(axis₂, a₂) … C_mount`, axes from the outermost to the innermost. A turntable has two
-//! kinds of errors. Errors that the table does not know (level, north, non-orthogonality, wobble, encoder errors that
-//! repeat with angle) change the true attitude but not the reading; see [`Imperfection`]. Errors of the reading
-//! (position error and reading noise) are added where readings are made.
+//! `C_b_n = C_base R(axis₁, a₁) R(axis₂, a₂) … C_mount`, axes from the outermost to the innermost. The errors of a
+//! turntable are of two kinds. Errors that the table does not know (level, north, non-orthogonality, wobble, encoder
+//! errors that repeat with angle) change the true attitude but not the reading; see [`Imperfection`]. Errors of the
+//! reading (position error and reading noise) are added in the places where readings are simulated.
 
 mod chain;
 mod geometry;

@@ -27,10 +27,10 @@ pub struct Motion {
 impl Motion {
     /// Drives a table with these imperfections along a path.
     ///
-    /// A rotation about body axes is checked against the lowest limits of all axes.
+    /// A rotation about body axes must stay within the lowest limits of all axes.
     ///
     /// # Errors
-    /// If the path does not fit the axes of the table or exceeds its limits.
+    /// Returns an error if the path does not fit the axes of the table or exceeds its limits.
     pub fn new(
         table: &Table,
         path: &Path,

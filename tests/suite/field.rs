@@ -918,7 +918,7 @@ fn a_rate_that_is_off_is_never_good() {
         let words = result.to_string();
         let is_named = [
             "clock of the log is doubtful",
-            "unit of the gyro rows is not clear",
+            "unit of the gyro rows is uncertain",
         ]
         .iter()
         .any(|named| words.contains(named));

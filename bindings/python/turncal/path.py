@@ -37,7 +37,7 @@ def evaluate(
         "auto" (default): average over the absence and the usual sizes of every error term; "none": only K, E and D; or
         terms to estimate in any case.
     specification : path-like, optional
-        Specification: tests whether the predicted σ are small enough to decide pass or fail.
+        Specification; turncal tests whether the predicted σ are small enough to decide pass or fail.
 
     Returns
     -------

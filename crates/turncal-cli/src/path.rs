@@ -17,7 +17,7 @@ use turncal_files::Opened;
 use turncal_input::small_file;
 use turncal_report::path::{Report, in_words, moves_in_words};
 
-/// Predicts calibration accuracy for a table path or for moves by hand, before any data exist
+/// Predicts the calibration accuracy of a table path or of moves by hand, before any data exist
 #[derive(Debug, clap::Args)]
 #[command(arg_required_else_help = true)]
 #[command(after_help = "Example:  turncal path evaluate three-axis")]
@@ -38,12 +38,12 @@ impl PathCommand {
     }
 }
 
-/// Predicts the σ of a path, the value of each move, and the errors that the path cannot reveal
+/// Predicts the σ for a path, the value of each move, and the errors that the path cannot reveal
 ///
 /// The path is a TOML file, an embedded name, or a list of moves by hand, separated by commas: x_up … z_down, and turns
-/// such as "turn x 90". With a run.toml, turncal predicts the σ for the recording that it describes. The prediction is
-/// the Cramér–Rao bound for the stated noise. With a specification, the exit status is 3 if the σ are too large to
-/// decide a limit.
+/// such as "turn x 90". With a run.toml, turncal predicts the σ for the recording described by this file. The
+/// prediction is the Cramér–Rao bound for the stated noise. With a specification, the exit status is 3 if the σ are too
+/// large to decide any of the limits.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal path evaluate three-axis
@@ -53,23 +53,23 @@ impl PathCommand {
 pub struct Evaluate {
     /// Path: a TOML file, an embedded name, a list of moves such as "z_up, turn x 90", or a run.toml
     path: String,
-    /// Scenario with site, rate, instrument and table [default: demo; by hand: mems]
+    /// Scenario that provides the site, rate, instrument and table [default: demo; by hand: mems]
     #[arg(long, value_name = "SCENARIO")]
     scenario: Option<String>,
-    /// Instrument that replaces the scenario's: a TOML file or an embedded name
+    /// Instrument to use instead of the scenario's instrument: a TOML file or an embedded name
     #[arg(long, value_name = "MODEL")]
     imu: Option<String>,
-    /// Table that replaces the scenario's: a TOML file or an embedded name
+    /// Table to use instead of the scenario's table: a TOML file or an embedded name
     #[arg(long, value_name = "MODEL")]
     table: Option<String>,
-    /// Observations of the filter [default: table; by hand: velocity]
+    /// Observations used by the filter [default: table; by hand: velocity]
     #[arg(long, value_parser = one_of(&AIDINGS))]
     aiding: Option<Aiding>,
-    /// Error terms of the calibration. auto: average over the absence and the usual sizes of every term; none: only K,
-    /// E and D; or the names of terms to estimate in any case [default: auto]
+    /// Error terms to estimate. auto: average over each term being absent or having one of its usual sizes; none: only
+    /// K, E and D; or names of terms that are always estimated [default: auto]
     #[arg(long, value_name = "TERM", value_parser = with_value(), value_delimiter = ',')]
     with: Vec<With>,
-    /// Specification: tests whether the predicted σ are small enough to decide pass or fail
+    /// Specification; turncal tests whether the predicted σ are small enough to decide pass or fail
     #[arg(long, value_name = "FILE")]
     specification: Option<PathBuf>,
     #[command(flatten)]

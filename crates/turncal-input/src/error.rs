@@ -1,4 +1,4 @@
-//! Error type of this module: place, content found, content expected, remedy.
+//! Error type of this module: location, content found, content expected, remedy.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -35,7 +35,7 @@ fn shown(path: &Path) -> String {
 pub struct FileError {
     /// The file at fault.
     pub file: PathBuf,
-    /// Place of the error in the file.
+    /// Location of the error in the file.
     pub place: Place,
     /// Content found, content expected, remedy.
     pub message: String,
@@ -62,7 +62,7 @@ pub enum Place {
         /// Name in the header.
         column: String,
     },
-    /// A row of a table in memory, from zero, and a column of it.
+    /// A row and a column of a table in memory; rows count from zero.
     Row {
         /// Row.
         row: u64,
@@ -139,7 +139,7 @@ impl FileError {
         }
     }
 
-    /// An error about the whole file.
+    /// An error that concerns the whole file.
     pub fn of(
         file: &Path,
         found: impl fmt::Display,
@@ -214,7 +214,7 @@ pub fn suggestion<'a>(
 /// Maximum number of characters of candidate names shown.
 const ROOM: usize = 2 * LONGEST;
 
-/// All candidate names, if they fit; otherwise the most similar first, and the number of others.
+/// All candidate names if they fit into the message; otherwise the most similar names and the number of the others.
 pub fn choice<'a>(wanted: &str, names: impl IntoIterator<Item = &'a str>) -> String {
     let names: Vec<&str> = names.into_iter().collect();
     let all = list(names.iter().copied());

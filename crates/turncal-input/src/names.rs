@@ -11,8 +11,8 @@ pub struct FileColumn {
     pub reversed: bool,
 }
 
-/// Index of an unused column by name or, if no column has this name, by number. The error consists of the content
-/// found, the content expected and the remedy.
+/// Index of an unused column by name or, if no column has this name, by number. The error contains the content found,
+/// the content expected and the remedy.
 pub fn find(all: &[String], taken: &[usize], name: &str) -> Result<usize, [String; 3]> {
     let mut places: Vec<usize> = (0..all.len()).filter(|&place| all[place] == name).collect();
     if let Ok(number) = name.parse::<usize>()
@@ -36,7 +36,7 @@ pub fn find(all: &[String], taken: &[usize], name: &str) -> Result<usize, [Strin
                 .to_owned(),
         ]),
         [] => {
-            let advice = "Correct `columns` in run.toml or this header.";
+            let advice = "Correct `columns` in run.toml, or the names in this header.";
             Err([
                 format!("no column named `{}`", excerpt(name)),
                 format!("one of {}", choice(name, header())),

@@ -26,7 +26,7 @@ use turncal_input::{FileError, Place, counted, excerpt};
 /// First bytes of a gzipped file.
 const GZIP: [u8; 2] = [0x1f, 0x8b];
 
-/// A file of rows, positioned at one row.
+/// A file of rows with its current row.
 ///
 /// Fields are separated by commas, semicolons, tabs or blanks, according to most rows. Lines that begin with `#`, `%`
 /// or `//` are comments; comments above the names, or above rows of numbers without names, form a preamble. Columns
@@ -202,7 +202,7 @@ fn not_rows(file: &DataFile, lines: &Lines, is_labelled: bool) -> Option<FileErr
         ),
         0 => (
             "NUL bytes at its beginning",
-            "The log was not written, or its memory was erased. Copy the log again.",
+            "The log was not written completely, or its memory was erased. Copy the log again.",
         ),
         _ => return None,
     };
@@ -336,8 +336,10 @@ impl Rows for CsvFile {
     fn cut_off(&self, done: &str) -> Option<String> {
         let (file, line) = (self.file.display(), self.line);
         let what = match self.cut? {
-            Cut::Row => "is truncated (fields are missing), so turncal ignored it",
-            Cut::Number => &format!("has no line end, so its last number may lack digits. {done}"),
+            Cut::Row => "has too few fields because it is truncated, so turncal ignored it",
+            Cut::Number => {
+                &format!("has no line ending, so its last number may lack digits. {done}")
+            }
         };
         Some(format!(
             "The last row of {file} (line {line}) {what}. Check that the file is complete."
@@ -352,7 +354,7 @@ fn no_tag(path: &Path, tag: &str) -> FileError {
         Place::File,
         "rows of text",
         format_args!("a log with a stream `{tag}`"),
-        "Leave `stream` out, or name another file.",
+        "Omit `stream`, or name another file.",
     )
 }
 
@@ -402,13 +404,13 @@ fn malformed(file: &Path, line: u64, what: Malformed) -> FileError {
     let (found, expected, advice) = match what {
         Malformed::Quote => (
             "an unclosed quote".to_owned(),
-            "one row per line, with every quote closed".to_owned(),
-            "Remove the quote or close it.",
+            "one row per line, with every quotation mark closed".to_owned(),
+            "Remove the quotation mark, or close it.",
         ),
         Malformed::Columns => (
             "too many columns".to_owned(),
             format!("at most {MOST_COLUMNS} columns"),
-            "Is this the right file? Export the columns that are needed.",
+            "Is this the right file? Export only the columns that are needed.",
         ),
         Malformed::Field => (
             format!("a field longer than {} KiB", LONGEST_FIELD / 1024),

@@ -74,8 +74,8 @@ impl DataFile {
             } else {
                 "a device or pipe"
             };
-            let expected = "a regular file that can be read more than once";
-            let advice = "Save its output to a file and give that file.";
+            let expected = "a regular file, which can be read more than once";
+            let advice = "Save the output of this pipe or device to a file, and give the file.";
             return Err(FileError::of(self, found, expected, advice));
         }
         let file = File::open(self).map_err(|error| self.refused(&error))?;

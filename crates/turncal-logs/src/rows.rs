@@ -80,7 +80,7 @@ pub trait Rows {
     }
 }
 
-/// A file at one of its rows, with the columns in use.
+/// A file of rows with its current row and the columns that are used.
 pub struct LogRows {
     rows: Box<dyn Rows>,
     used: Vec<usize>,
@@ -167,7 +167,7 @@ impl LogRows {
         )
     }
 
-    /// An error about the whole file.
+    /// An error that concerns the whole file.
     pub fn error(
         &self,
         found: impl Display,

@@ -18,7 +18,7 @@ impl Table {
     /// Columns with their names; NaN marks a missing number. Errors refer to the table by `name`.
     ///
     /// # Errors
-    /// [`FileError`] if the columns differ in length.
+    /// Returns [`FileError`] if the columns differ in length.
     pub fn new(
         name: impl AsRef<Path>,
         columns: Vec<(String, Vec<f64>)>,
@@ -33,7 +33,7 @@ impl Table {
                 columns[other].len(),
                 names[other]
             );
-            let advice = "Give columns of the same rows.";
+            let advice = "Give columns with the same number of rows.";
             return Err(FileError::of(&name, found, "columns of one length", advice));
         }
         Ok(Self {
@@ -65,7 +65,7 @@ impl Table {
     }
 }
 
-/// A table, positioned at one of its rows.
+/// A table with its current row.
 pub struct TableRows {
     table: Table,
     /// Units of the columns; empty if not stated.

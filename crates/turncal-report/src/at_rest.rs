@@ -14,9 +14,9 @@ pub fn document(at_rest: &AtRest, run: &Run, calibration: &Calibration) -> Docum
     let (outputs, thermal) = (&at_rest.outputs, &at_rest.thermal);
     let range = thermal.model.range.gyro;
     document.lead.push(format!(
-        "Run {name} stays in one attitude for {:.0} s while its temperature covers {:.1} to {:.1} °C. Such a recording \
-         can show only bias against temperature; the accelerometer values also contain the scale-factor error times \
-         gravity in this attitude.",
+        "In the run {name}, the instrument stays in one attitude for {:.0} s while the temperature changes from {:.1} \
+         to {:.1} °C. Such a recording can show only the biases as a function of temperature; the accelerometer \
+         values also contain the scale-factor error times gravity in this attitude.",
         run.recording.imu.duration(),
         range.lowest,
         range.highest
@@ -56,7 +56,7 @@ fn residuals(at_rest: &AtRest) -> Plot {
     let heading = "Residuals of the biases against temperature";
     let panels = at_rest.means.iter().map(panel);
     Plot::new("residuals-temperature.svg", heading, (3, 260), panels).caption(
-        "Mean output over a block minus the polynomial with its rate term. If heating and cooling differ, the \
-         temperature sensor lags the instrument, or the instrument has hysteresis.",
+        "Mean output over a block of samples minus the polynomial with its rate term. If the heating and cooling \
+         curves differ, the temperature sensor lags the inertial sensor, or the instrument has hysteresis.",
     )
 }

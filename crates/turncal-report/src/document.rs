@@ -1,5 +1,5 @@
-//! The report on a result as data: facts, tables, plots and findings. Renderers turn it into text, a page or JSON,
-//! independently of the kind of result.
+//! The report on a result as data: facts, tables, plots and findings. Renderers convert the report to text, a page or
+//! JSON, independently of the kind of result.
 
 use serde_json::Value;
 
@@ -11,7 +11,7 @@ use turncal::calibration::{Finding, Word};
 pub struct Document {
     /// Title of the report.
     pub title: String,
-    /// Whether the result may be used, and a summary in one line.
+    /// Whether the result may be used, with a one-line summary.
     pub verdict: Option<(Word, String)>,
     /// Method and data, one paragraph each.
     pub lead: Vec<String>,
@@ -23,7 +23,7 @@ pub struct Document {
     pub warnings: List,
     /// Conclusions from the figures, the most important first.
     pub conclusions: List,
-    /// Facts, tables and plots in order, each with a flag that is true if only the page shows it.
+    /// Facts, tables and plots in order, each with a flag that is true if it is shown only on the page.
     pub blocks: Vec<(PageOnly, Block)>,
     /// The figures by name, with the unit in the name; NaN becomes null.
     pub data: Value,
@@ -49,7 +49,7 @@ pub enum Block {
     Text(String, String),
     /// Lines to copy verbatim, below a heading.
     Code(String, String),
-    /// Start of a section of details with this heading, which extends to the next section and is collapsed on a page.
+    /// Start of a section of details with this heading; the section extends to the next one and is collapsed on a page.
     Fold(String),
 }
 

@@ -79,7 +79,7 @@ impl Report<'_> {
         let (word, text) = match (self.checks, self.not_decided().len(), unobserved) {
             (Some(_), 0, _) => (
                 Word::Pass,
-                "a unit at its nominal values passes every limit".to_owned(),
+                "a unit whose values are nominal passes every limit".to_owned(),
             ),
             (Some(checks), open, _) => (
                 Word::Undecided,
@@ -92,7 +92,7 @@ impl Report<'_> {
             (None, _, unobserved) => (
                 Word::UseWithCare,
                 format!(
-                    "the σ of {} of parameters is still more than half of the prior",
+                    "the σ of {} of parameters is still more than half of the prior σ",
                     several(unobserved, "combination")
                 ),
             ),
@@ -161,8 +161,8 @@ impl Report<'_> {
         let columns = columns.chain(Group::all().map(Group::short));
         let mut table = Table::new("σ without each move, divided by the σ with all moves", columns)
             .section(self.evaluation.without.iter().enumerate().map(row))
-            .note("A path without the move also lacks the dwell after it. Evaluate the shorter path before you use \
-                it.");
+            .note("If the move is left out of a path, the dwell after it is missing too. Evaluate a shortened path before you use \
+            it.");
         table.optional = vec![2];
         table
     }
@@ -263,8 +263,8 @@ fn table(all: &[NotShown]) -> Table {
     )
     .section(all.iter().map(row))
     .note(
-        "Combinations of parameters, and error terms that are not estimated, that keep more than half of their prior \
-         σ. Could change: RMS change, in σ, of the group most affected by a term of usual size.",
+        "Combinations of parameters, and error terms that are not estimated, whose σ stays above half of the prior \
+         σ. Could change: RMS change, in units of σ, of the group that a term of usual size affects most.",
     )
 }
 

@@ -31,7 +31,7 @@ pub fn unit(block: ErrorTerm) -> (&'static str, f64) {
     }
 }
 
-/// Rows of the parameter table, with errors if `errors` requests them and the truth states them.
+/// Rows of the parameter table; the errors are included if `errors` is true and the truth states them.
 pub fn rows(
     auxiliary: &Auxiliary,
     truth: &BTreeMap<String, TermRecord>,
@@ -87,7 +87,7 @@ pub fn parameter_row(
     row
 }
 
-/// Prior σ divided by posterior σ, with a note if the parameter was not observed.
+/// Prior σ divided by posterior σ; a note is added if the parameter was not observed.
 pub fn improvement(prior: f64, posterior: f64) -> String {
     let ratio = prior / posterior;
     if !ratio.is_finite() {
@@ -119,7 +119,7 @@ pub fn explained(all: &[TermEvidence]) -> Table {
     let rows = [estimated, others].map(|terms| terms.into_iter().map(row));
     Table::new(
         "Evidence for each error term",
-        columns("term | present | σ grows | shown by this path"),
+        columns("term | present | σ ratio | shown by this path"),
     )
     .sections(rows)
     .note(
@@ -128,7 +128,7 @@ pub fn explained(all: &[TermEvidence]) -> Table {
          probabilities.",
     )
     .note(
-        "σ grows: σ with the term divided by σ without it, RMS over the parameters of the group with the largest \
+        "σ ratio: σ with the term divided by σ without it, RMS over the parameters of the group with the largest \
          ratio.",
     )
     .note(
@@ -153,7 +153,7 @@ fn presence(present: f64) -> String {
     }
 }
 
-/// The group whose σ grows most; a dash if none grows visibly.
+/// The group whose σ grows most; a dash if no σ grows visibly.
 fn growth(of: &TermEvidence) -> String {
     let groups = Group::all().zip(of.sigma_factors);
     let grown = groups.filter_map(|(group, factor)| Some((group, factor?)));

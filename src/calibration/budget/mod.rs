@@ -1,7 +1,7 @@
 //! The uncertainty budget of an estimate: its covariance by source (JCGM 100:2008, JCGM 102:2011).
 //!
 //! The covariance of a filter is homogeneous of degree one in the variances of all sources together: priors, noise of
-//! the instrument, errors of the table, noise of each observation. The contribution of a source is therefore its
+//! the instrument, errors of the table, and noise of each observation. The contribution of a source is therefore its
 //! variance times the derivative of the covariance with respect to this variance, and the contributions add up to the
 //! covariance (Euler). The contributions of effects between dwells come from one backward pass (Koopman and Shephard
 //! 1992), the contribution of the prior is exact, and those of sources at rest are finite differences of the chain.
@@ -83,7 +83,7 @@ impl Budget {
     /// The budget of the estimate of an outcome.
     ///
     /// # Errors
-    /// [`CalibrationError`] if the problem is not the one of the outcome.
+    /// Returns [`CalibrationError`] if the outcome belongs to a different problem.
     pub fn new(problem: &Problem, outcome: &Outcome) -> Result<Self, CalibrationError> {
         let problem = &problem.with(|model| model.prior_sigma = outcome.model.prior_sigma);
         let by_source = of_chain(problem, outcome)?;

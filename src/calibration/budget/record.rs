@@ -7,7 +7,7 @@ use crate::calibration::Budget;
 /// Standard uncertainties of the estimated parameters by source, in the order and units of the parameters.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BudgetRecord {
-    /// Contribution of each source; the squares of the contributions add up to the variances.
+    /// Contribution of each source; the sum of the squares of the contributions is the variance.
     pub sources: Vec<BudgetPartRecord>,
     /// Effective degrees of freedom; `None` if infinite.
     pub degrees_of_freedom: Vec<Option<f64>>,

@@ -31,7 +31,8 @@ pub struct Moments {
 /// Moments of the disturbances of each event of each effect, given all data.
 pub struct Smoothed(pub BTreeMap<(Effect, usize), Moments>);
 
-/// Smoothing cumulants: the mean if all constants are zero, the effect of the constants, and the precision.
+/// Smoothing cumulants: the mean for the case that all constants are zero, the effect of the constants, and the
+/// precision.
 pub struct Cumulants {
     pub mean: DVector<f64>,
     pub by_constants: DMatrix<f64>,
@@ -61,7 +62,7 @@ impl Cumulants {
 }
 
 impl Filtered<'_> {
-    /// Runs backward through the links; `visit` receives the number of each link with the cumulants of its rows and all
+    /// Runs backward through the links; passes to `visit` the number of each link and the cumulants of its rows and all
     /// later rows.
     pub fn backward(&self, mut visit: impl FnMut(usize, &Cumulants)) {
         let (n, c) = (self.chain.states.count, self.chain.constants.len());

@@ -28,7 +28,8 @@ pub enum Slip {
 }
 
 impl Effect {
-    /// Whether single events of this effect may be far larger than the others: moves, positions, bias steps and slips.
+    /// Whether single events of this effect (moves, position errors, bias steps and slips) may be far larger than the
+    /// others.
     pub fn has_heavy_tails(self) -> bool {
         match self {
             Self::Slip(_) => true,
@@ -101,11 +102,11 @@ impl Sizes {
     }
 }
 
-/// Variance of the noise at rest in each dwell, relative to all dwells.
+/// Variance of the noise at rest in each dwell, relative to that of all dwells.
 ///
-/// A dwell with more motion than the others then does not increase the noise of the others: with an inverse-gamma prior
-/// for the variance, the noise of a dwell follows Student's t distribution (Lange, Little, Taylor 1989, J. Am. Stat.
-/// Assoc. 84(408)).
+/// With this factor, a dwell with more motion than the others does not increase the noise of the others: with an
+/// inverse-gamma prior for the variance, the noise of a dwell follows Student's t distribution (Lange, Little, Taylor
+/// 1989, J. Am. Stat. Assoc. 84(408)).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dispersion(Vec<f64>);
 

@@ -14,8 +14,8 @@ const BLOCK: usize = 100;
 /// A filtered link.
 #[derive(Debug, Clone)]
 pub struct Passed {
-    /// States before the rows are used: the mean if all constants are zero, the effect of the constants, and the
-    /// covariance.
+    /// States before the rows are used: the mean for the case that all constants are zero, the effect of the constants,
+    /// and the covariance.
     pub mean: DVector<f64>,
     pub by_constants: DMatrix<f64>,
     pub covariance: DMatrix<f64>,
@@ -47,10 +47,10 @@ pub struct Filtered<'a> {
 }
 
 impl Chain {
-    /// Runs the filter with these sizes.
+    /// Runs the filter with these sizes of the effects.
     ///
     /// # Errors
-    /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
+    /// Returns [`CalibrationError::Diverged`] if a covariance is not positive definite.
     pub fn filter(&self, sizes: &Sizes) -> Result<Filtered<'_>, CalibrationError> {
         let mut forward = Forward::new(self.states.count, self.constants.len());
         let passed = self.links.iter().map(|link| forward.pass(link, sizes));
@@ -66,7 +66,7 @@ impl Chain {
     /// Information on the constants from a filter with these sizes, without keeping its links.
     ///
     /// # Errors
-    /// [`CalibrationError::Diverged`] if a part cannot be reduced, or a covariance is not positive definite.
+    /// Returns [`CalibrationError::Diverged`] if a part cannot be reduced, or a covariance is not positive definite.
     pub fn information(
         problem: &Problem,
         script: &Script,
@@ -100,7 +100,7 @@ impl Forward {
     /// Filters one link.
     ///
     /// # Errors
-    /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
+    /// Returns [`CalibrationError::Diverged`] if a covariance is not positive definite.
     fn pass(&mut self, link: &Link, sizes: &Sizes) -> Result<Passed, CalibrationError> {
         let transition = &link.transition;
         let mean = &transition.states * &self.mean + &transition.offset;

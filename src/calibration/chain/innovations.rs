@@ -1,4 +1,4 @@
-//! Innovations of single observations, and the estimate against time that a real-time filter would compute.
+//! Innovations of single observations, and the estimate as a function of time that a real-time filter would compute.
 
 use nalgebra::{DMatrix, DVector, Matrix3, SymmetricEigen};
 
@@ -24,10 +24,10 @@ struct Expected {
 
 impl Filtered<'_> {
     /// Innovations of all observations, each predicted from the preceding observations, and the estimate after parts of
-    /// dwells. `sites` gives the prior of the constants that may be absent.
+    /// dwells. `sites` gives the priors of the constants that may be absent.
     ///
     /// # Errors
-    /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
+    /// Returns [`CalibrationError::Diverged`] if a covariance is not positive definite.
     pub fn innovations(
         &self,
         (problem, script): (&Problem, &Script),

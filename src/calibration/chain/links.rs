@@ -39,10 +39,10 @@ impl Chain {
         self
     }
 
-    /// The links of a problem, from its events at one linearisation point, with this dispersion of the dwells.
+    /// The links of a problem, made from its events at one linearisation point, with this dispersion of the dwells.
     ///
     /// # Errors
-    /// [`CalibrationError::Diverged`] if a part of a dwell cannot be reduced.
+    /// Returns [`CalibrationError::Diverged`] if a part of a dwell cannot be reduced.
     pub fn new(
         problem: &Problem,
         script: &Script,

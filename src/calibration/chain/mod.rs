@@ -3,8 +3,8 @@
 //! Within a part of a dwell, noise at rest is the only disturbance; [`links`] reduces each part once to rows in its
 //! initial states and the constants. Between parts, moves, table positions and varying biases change the states. The
 //! parts form a chain of links, which [`forward`] filters with the constants as sensitivity columns (Friedland 1969,
-//! "Treatment of bias in recursive filtering", IEEE Trans. Automatic Control 14(4)) and [`backward`] smooths. Changing
-//! the size of an effect needs no new pass over the samples.
+//! "Treatment of bias in recursive filtering", IEEE Trans. Automatic Control 14(4)) and [`backward`] smooths. If the
+//! size of an effect changes, the samples need not be processed again.
 
 mod backward;
 mod dynamics;

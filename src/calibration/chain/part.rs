@@ -1,13 +1,14 @@
-//! Reduction of a part of a dwell, disturbed only by noise at rest, to whitened rows in the states at its beginning.
+//! Reduces a part of a dwell, in which noise at rest is the only disturbance, to whitened equations for the states at
+//! the beginning of the part.
 //!
-//! At rest the parameters act through three constant rates and three constant specific forces. Given these and the
-//! states at the beginning (together `g`), only noise remains. A filter of the moving states whitens this noise in each
-//! observation. The whitened observations and the states at the end are linear in `g`: together they contain all
+//! At rest, the parameters act through three constant rates and three constant specific forces. If these and the states
+//! at the beginning (together `g`) are given, only noise remains. A filter of the moving states whitens this noise in
+//! each observation. The whitened observations and the states at the end are linear in `g`: together they contain all
 //! information of the part (Friedland 1969, "Treatment of bias in recursive filtering", IEEE Trans. Automatic Control
 //! 14(4)).
 //!
-//! In addition to the navigation errors, an attitude is observed: by hand, the rotation since the body came to rest;
-//! after a table move, the attitude error minus the fading settling of the table.
+//! In addition to the navigation errors, an attitude is observed: for a recording by hand, the rotation since the body
+//! came to rest; after a table move, the attitude error minus the fading settling error of the table.
 
 mod course;
 
@@ -33,7 +34,7 @@ pub struct Part {
     pub log_determinant: f64,
     /// Number of scalars that were observed.
     pub count: usize,
-    /// Moving states at the end of the part: rows in `g`, offset and covariance.
+    /// States that change within the part, at its end: rows in `g`, offset and covariance.
     pub of_given: DMatrix<f64>,
     pub offset: DVector<f64>,
     pub covariance: DMatrix<f64>,
@@ -79,7 +80,7 @@ pub trait PartFilter {
     ) -> Option<Part>;
 }
 
-/// The filters for this number of moving states: one for parts that follow a move, one for other parts.
+/// The filters for this number of changing states: one for parts that follow a move, and one for other parts.
 pub fn part_filters(moving: usize) -> [Box<dyn PartFilter>; 2] {
     let begins = begins(moving).into_iter().enumerate();
     if moving == NAVIGATION {
@@ -98,7 +99,7 @@ pub fn filter_of(rest: &Rest) -> usize {
     usize::from(!(rest.first && rest.new_position))
 }
 
-/// The moving states in `g`; position is not among them, because nothing in a dwell depends on it.
+/// The states in `g` that change within the part; position is not among them, because nothing in a dwell depends on it.
 pub fn begins(moving: usize) -> Vec<usize> {
     let is_position = |state: &usize| (POSITION..POSITION + 3).contains(state);
     (0..moving).filter(|state| !is_position(state)).collect()

@@ -30,7 +30,7 @@ pub enum EventKind {
     Slip(Slip),
 }
 
-/// An event that is too large to result from its effect by chance, even with heavy tails.
+/// An event that is too large to result from its effect by chance, even if the effect has a heavy-tailed distribution.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Event {
     /// Kind.
@@ -185,23 +185,24 @@ impl EventKind {
             Self::Position => (
                 Kind::PositionWrong,
                 format!(
-                    "The table readings in dwell {number} are wrong by {angle} (at {time:.1} s). turncal gave these \
-                     readings next to no weight. Check the table log there for a bump or a wrong reading"
+                    "The table readings in dwell {number} (at {time:.1} s) are wrong by {angle}. turncal gave these \
+                     readings next to no weight. Check the table log around this time for a bump or a wrong reading"
                 ),
             ),
             Self::Move => (
                 Kind::MoveWrong,
                 format!(
-                    "In the move before dwell {number} (at {time:.1} s) the gyros missed a turn of {angle}. turncal \
-                     estimated this angle. Check the log there for lost samples, an exceeded range or a loose mount"
+                    "In the move before dwell {number} (at {time:.1} s), the gyros missed a turn of {angle}. turncal \
+                     estimated this angle. Check the log around this time for lost samples, rates beyond the \
+                     measuring range, or a loose mount"
                 ),
             ),
             Self::Velocity => (
                 Kind::VelocityWrong,
                 format!(
-                    "In the move before dwell {number} (at {time:.1} s) the accelerometers missed a velocity of \
-                     {size:.2e} m/s. turncal estimated this velocity. Check the log there for lost samples, an \
-                     exceeded range or a bump"
+                    "In the move before dwell {number} (at {time:.1} s), the accelerometers missed a velocity of \
+                     {size:.2e} m/s. turncal estimated this velocity. Check the log around this time for lost \
+                     samples, forces beyond the measuring range, or a bump"
                 ),
             ),
             Self::BiasStep(sensor) => {
@@ -213,9 +214,9 @@ impl EventKind {
                 (
                     Kind::BiasStep,
                     format!(
-                        "Before dwell {number} (at {time:.1} s) the {sensor} biases changed by about {} {name}. \
-                         The calibration contains the mean bias over the recording. Check the log there for a shock or \
-                         a jump of temperature or supply",
+                        "Before dwell {number} (at {time:.1} s), the {sensor} biases changed by about {} {name}. \
+                         The calibration contains the mean bias over the recording. Check the log around this time \
+                         for a shock, or for a sudden change of temperature or supply voltage",
                         three_digits(size)
                     ),
                 )
@@ -228,7 +229,7 @@ impl EventKind {
                 (
                     Kind::Slipped,
                     format!(
-                        "Before dwell {number} (at {time:.1} s) {what} by {angle}. turncal estimated this angle; the \
+                        "Before dwell {number} (at {time:.1} s), {what} by {angle}. turncal estimated this angle; the \
                          misalignments refer to the mounting before this event. Fasten the instrument and the table, \
                          and repeat the recording"
                     ),

@@ -50,13 +50,14 @@ pub struct Innovation {
     pub time: f64,
     /// Kind of observation.
     pub observation: Observation,
-    /// East, North and Up in units of their own σ, independent of each other.
+    /// East, North and Up components, each divided by its own σ; the three are independent.
     pub whitened: [f64; 3],
     /// σ of the three components, rad or m/s.
     pub sigma: [f64; 3],
     /// Number of the dwell that contains the observation.
     pub dwell: usize,
-    /// Whether the innovation shows the errors of the move before its dwell; false if rows are missing between the two.
+    /// Whether the innovation shows the errors of the move before its dwell; false if rows are missing between move and
+    /// dwell.
     pub after_move: bool,
 }
 
@@ -108,17 +109,17 @@ type Squares = fn(&[&Innovation]) -> Vec<f64>;
 /// Innovations that are tested separately: text that follows the kind of observation, the causes to check if the
 /// innovations are large, and their squares.
 const LOOKS: [(&str, &str, &str, Squares); 3] = [
-    ("all", "", "the white noise in [imu.noise]", of_all),
+    ("all", "", "the white noise figures in [imu.noise]", of_all),
     (
         AFTER_MOVES,
         " first after each move",
-        "the noise of moves and of the table position, the time stamps and --with time-offset",
+        "the noise of moves, the table position, the time stamps and --with time-offset",
         after_moves,
     ),
     (
         "over-dwells",
         " summed over each dwell",
-        "the bias variation in [imu.noise], or add --temperature if biases follow the temperature",
+        "the bias variation in [imu.noise]; if the biases follow the temperature, add --temperature",
         over_dwells,
     ),
 ];
@@ -148,8 +149,8 @@ fn over_dwells(innovations: &[&Innovation]) -> Vec<f64> {
     summed.collect()
 }
 
-/// The finding on innovations that do not agree with their covariance, if any. `pulses` are the kinds of observation
-/// that contain remainders of pulses.
+/// The finding on innovations that do not agree with their covariance, if there is one. `pulses` are the kinds of
+/// observation that contain remainders of pulses.
 pub fn inconsistent(innovations: &[Innovation], pulses: &[Observation]) -> Option<Finding> {
     let of = |kind| innovations.iter().filter(move |i| i.observation == kind);
     let kinds = Observation::ALL.map(|kind| (kind, of(kind).collect::<Vec<_>>()));
@@ -188,7 +189,8 @@ pub fn inconsistent(innovations: &[Innovation], pulses: &[Observation]) -> Optio
         }
     }
     let text = format!(
-        "The residuals do not have the size that their σ predict. Relative to the predicted size, they are: {}. Check \
+        "The size of the residuals does not agree with their predicted σ. Relative to the predicted size, the \
+         residuals are: {}. Check \
          {}.",
         each.join("; "),
         causes.join("; ")

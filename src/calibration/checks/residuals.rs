@@ -50,8 +50,8 @@ impl Residuals {
         let text = format!(
             "The static fit of {of} is poor (χ² {chi_square:.0} with {degrees} degrees of freedom; limit {limit:.0}). \
              turncal widened the σ {}. The worst interval is {begin:.1}–{end:.1} s. Look there for a bump, a wrong \
-             label or a wrong attitude; otherwise check the noise figures in [imu.noise], the level and north of the \
-             table in [turntable], and whether the sensor was really still.",
+             label or a wrong attitude; if you find none, check the noise figures in [imu.noise], the level and north \
+             of the table in [turntable], and whether the sensor was really still.",
             widened_by(growth)
         );
         let figures = json!({

@@ -19,9 +19,9 @@ const NOTHING: f64 = f64::EPSILON * f64::EPSILON;
 /// Smallest growth of σ that is reported.
 const SAID: f64 = 1.05;
 
-/// Covariance due to rounding: the rounding errors in the means of dwells, propagated through least squares with the
-/// prior. Dwells with means within the same step have the same error. Without a table, accelerometers at rest observe
-/// only the magnitude of gravity.
+/// Covariance due to rounding: the rounding errors of the mean outputs in dwells, propagated through least squares with
+/// the prior. Dwells whose means are within the same step have the same rounding error. Without a table, accelerometers
+/// at rest observe only the magnitude of gravity.
 pub fn by_rounding(problem: &Problem, triads: &PerSensor<Triad>) -> ParameterMatrix {
     let of = |&sensor: &Sensor| of_triad(problem, sensor, triads);
     Sensor::ALL.iter().filter_map(of).sum()
@@ -49,8 +49,8 @@ pub fn rounded(
         };
         let step = steps.fold(0.0, f64::max) / value;
         let text = format!(
-            "{} values are rounded to {} {unit}, coarser than their noise, so averaging cannot recover their \
-             position within a step. turncal widened the σ {}. Log more digits.",
+            "{} values are rounded to {} {unit}, which is coarser than their noise, so averaging cannot recover the \
+             mean within a step. turncal widened the σ {}. Log more digits.",
             triad_name(sensor),
             three_digits(step),
             widened_by(growth)

@@ -14,7 +14,7 @@ use crate::statistics::FALSE_ALARM;
 /// A term that a path does not show is reported if it increases the σ of a group by more than this factor.
 const NAMED: f64 = 1.25;
 
-/// Whether a candidate that is absent with this probability counts as present, if there are this many candidates.
+/// Whether a candidate with this probability of absence counts as present, given the number of candidates.
 pub fn is_shown(absent: f64, candidates: usize) -> bool {
     absent < FALSE_ALARM / candidates.max(1) as f64
 }
@@ -115,7 +115,7 @@ fn estimated(shown: &[&TermEvidence]) -> Option<Finding> {
     let text = format!(
         "The data show errors that scale factors, misalignments and biases cannot explain: {} (probability above 99.9 \
          %). turncal estimated these error terms too, as if they had been given with --with. Apply the calibration \
-         with `turncal apply`; exports without these terms leave their errors in.",
+         with `turncal apply`; exports without these terms leave the errors in the data.",
         names.join(", ")
     );
     let finding = || Finding::new(Kind::ErrorTermEstimated, text, figures(shown));
@@ -135,7 +135,7 @@ fn not_shown(terms: &[&TermEvidence]) -> Option<Finding> {
     shown_by.dedup();
     let text = format!(
         "This recording cannot show these possible errors, so they increase the σ: {}. Add {}, or use --with none if \
-         the sensor is known to have none of them.",
+         you know that the sensor has none of these errors.",
         each.join(", "),
         shown_by.join(", ")
     );

@@ -31,7 +31,7 @@ pub fn not_converged(outcome: &Outcome) -> Option<Finding> {
         .last()
         .map_or(f64::NAN, |pass| pass.largest_step);
     let text = format!(
-        "Not converged: the last of {passes} passes still moved a parameter by {step:.2} σ. Do not use the values or \
+        "Not converged: in the last of {passes} passes, a parameter still changed by {step:.2} σ. Do not use the values or \
          σ. Check scale, units and axes in run.toml with turncal check."
     );
     let figures = json!({ "passes": passes, "largest_step_sigma": step });
@@ -52,7 +52,8 @@ pub fn absurd(problem: &Problem, outcome: &Outcome) -> Option<Finding> {
     let (name, middle) = worst.max_by(|one, other| one.1.total_cmp(&other.1))?;
     let percent = format!("{} %", three_digits(100.0 * middle));
     let text = format!(
-        "Calibration rejected: in the median dwell {}, more than the error of any sensor after calibration. Do not use \
+        "Calibration rejected: in the median dwell, {}, which is more than the error of any calibrated \
+         sensor. Do not use \
          the values or σ. Check units, axes and rate in run.toml with turncal check.",
         name.replace("{}", &percent)
     );
@@ -67,7 +68,7 @@ pub fn unexplained(all: &Nis, innovations: &[Innovation]) -> Option<Finding> {
     rejected("NIS", all.mean, worst.0)
 }
 
-/// The finding for a closed form, from the findings on its residuals.
+/// The finding for a closed form, derived from the findings on its residuals.
 pub fn unexplained_residuals(findings: &[Finding]) -> Option<Finding> {
     let large = |finding: &&Finding| finding.is(Kind::ResidualsLarge);
     findings.iter().filter(large).find_map(|finding| {
@@ -82,7 +83,7 @@ pub fn unexplained_residuals(findings: &[Finding]) -> Option<Finding> {
 fn rejected(name: &str, nis: f64, worst: f64) -> Option<Finding> {
     let limit = limit();
     let text = format!(
-        "Calibration rejected: {name} is {nis:.0}, far above anything a wrong noise figure could cause (limit \
+        "Calibration rejected: {name} is {nis:.0}, far larger than any wrong noise figure could cause (limit \
          {limit:.0}). The largest residual is at {worst:.1} s: look there for lost, repeated or wrapped rows, a bump \
          or a wrong table position."
     );

@@ -23,7 +23,7 @@ pub struct Information {
     pub vector: DVector<f64>,
 }
 
-/// Normal priors of the constants that may be absent, and the covariance that averaging over several cases adds.
+/// Normal priors of the constants that may be absent, and the additional covariance from averaging over several cases.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sites {
     pub information: Information,
@@ -185,7 +185,7 @@ impl Known {
 }
 
 impl Sites {
-    /// Makes all constants known at their prior mean, to a millionth of their usual size.
+    /// Fixes all constants at their prior mean, to a millionth of their usual size.
     pub fn certain(prior: &Prior) -> Self {
         let (n, m) = (prior.sigma.len(), prior.candidates);
         let information = prior

@@ -22,16 +22,16 @@ pub type Parts = [DVector<f64>; BY_HAND.len()];
 /// Additional noise that makes the errors more likely than the stated noise.
 ///
 /// The noise is estimated by maximum likelihood, with the parameters integrated out under their prior. If there are
-/// only a few more equations than parameters, the residuals do not show the noise, because parameter values that are
-/// unlikely under the prior can explain any noise.
+/// only a few more equations than parameters, the residuals do not show the noise, because unlikely parameter values
+/// can explain any noise.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ByHand {
     found: Vec<Component>,
 }
 
 impl ByHand {
-    /// Adds sources one by one while the improvement is significant, from the prior errors of the equations and their
-    /// covariance due to prior and stated noise.
+    /// Adds sources one by one while the improvement is significant, given the errors of the equations at the prior and
+    /// the covariance of these errors due to prior and stated noise.
     pub fn likeliest(
         errors: &DVector<f64>,
         covariance: &DMatrix<f64>,

@@ -16,7 +16,7 @@ use crate::number::three_digits;
 pub struct NoiseReport {
     /// The requested policy.
     pub policy: NoisePolicy,
-    /// Whether the noise was estimated; if not, the stated noise was used.
+    /// Whether the noise was estimated; if it was not, the stated noise was used.
     pub learnt: bool,
     /// The test of the stated noise; `None` if no figure was tested.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -26,7 +26,7 @@ pub struct NoiseReport {
     pub sources: Vec<SourceFigures>,
 }
 
-/// The test of the stated noise against the estimated noise.
+/// Test whether the stated noise agrees with the estimated noise.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct NoiseTest {
     /// The largest squared distance of a stated figure from the estimate: logarithm of the ratio, in units of its σ.
@@ -147,7 +147,7 @@ fn symbol(unit: &str) -> String {
     })
 }
 
-/// A finding lists a stated figure if the estimate is more than this many times as large.
+/// A finding lists a stated figure if the estimate is more than this many times as large as the figure.
 pub const NAMED: f64 = 1.5;
 
 /// The finding on estimated noise, with the squared distance of the worst stated figure and its limit. `None` if no
@@ -179,8 +179,8 @@ fn noise_learnt(
     let tables: Vec<String> = tables.collect();
     let lines: Vec<&String> = lines.iter().map(|(_, line)| line).collect();
     let text = format!(
-        "Noise is larger than stated: {} (squared distance {ratio:.0}; limit {limit:.0}). turncal used its own \
-         estimate, which is included in every σ. To use this estimate for the next recording, state {}.",
+        "The noise is larger than stated: {} (squared distance {ratio:.0}; limit {limit:.0}). turncal used its own \
+         estimate, which every σ includes. To use this estimate for the next recording, state {}.",
         words.join("; "),
         tables.join("; ")
     );

@@ -60,7 +60,7 @@ sources! {
         "imu.noise" GYRO.random_walk, part of White(Gyro);
     VelocityRandomWalk, Accel, "velocity random walk" in "ug/sqrt(Hz)" = MICRO_G_PER_SQRT_HZ,
         "imu.noise" ACCEL.random_walk, part of White(Accel);
-    GyroMotion, Gyro, "attitude noise in moves, by rate" in "sqrt(s)" = 1.0,
+    GyroMotion, Gyro, "attitude noise of moves, proportional to rate" in "sqrt(s)" = 1.0,
         "imu.noise" (GYRO.by_motion, 1.0), part of Moves(Gyro);
     AccelMotion, Accel, "velocity noise in moves, by acceleration" in "sqrt(s)" = 1.0,
         "imu.noise" (ACCEL.by_motion, 1.0), part of Moves(Accel);

@@ -26,7 +26,7 @@ pub enum AuxiliaryKind {
 }
 
 impl AuxiliaryKind {
-    /// The parameter at an index; `None` beyond the last.
+    /// The auxiliary parameter at an index; `None` if the index is beyond the last parameter.
     pub fn of(index: usize) -> Option<Self> {
         match index.checked_sub(TABLE_GEOMETRY) {
             None => Some(Self::Table(index)),
@@ -115,8 +115,8 @@ impl Auxiliary {
             .into()
     }
 
-    /// Whether the second-order and the asymmetry term of an accelerometer are both estimated, although hardly more
-    /// than their sum is observed.
+    /// Whether the second-order term and the asymmetry term of an accelerometer are both estimated, although the data
+    /// determine hardly more than their sum.
     pub fn even_terms_inseparable(&self) -> bool {
         let first = |term: Term| TABLE_GEOMETRY + term.parameters().start;
         let (second, asymmetry) = (first(Term::AccelSecondOrder), first(Term::AccelAsymmetry));

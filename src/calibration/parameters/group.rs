@@ -21,7 +21,7 @@ pub struct GroupEntry {
     pub key: &'static str,
     /// Symbol of the unit.
     pub unit: &'static str,
-    /// The size of the unit in the normalised SI values of the model.
+    /// Size of the unit in the normalised SI values of the model.
     pub value: f64,
 }
 
@@ -96,7 +96,7 @@ impl Group {
         self.entry().unit
     }
 
-    /// The size of the unit in the normalised SI values of the model.
+    /// Size of the unit in the normalised SI values of the model.
     pub fn unit_value(self) -> f64 {
         self.entry().value
     }

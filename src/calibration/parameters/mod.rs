@@ -1,4 +1,4 @@
-//! The parameters of both triads as one vector: gyros, then accelerometers, each in the order of
+//! The parameters of both triads as one vector: first the gyros, then the accelerometers, each in the order of
 //! [`crate::imu::TriadVector`]. Parameter errors δθ are true − estimated.
 
 pub mod auxiliary;

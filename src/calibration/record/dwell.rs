@@ -42,8 +42,8 @@ pub struct Standing {
     pub time: f64,
     /// Index of the error model of the step in the part.
     pub model: usize,
-    /// Change of the errors of attitude, velocity and position before the step, which occurs because the errors then
-    /// refer to another computed state.
+    /// Change in the errors of attitude, velocity and position before the step; it occurs because the errors then refer
+    /// to a different computed state.
     pub referred: [Vector3<f64>; 3],
     /// Indices of the observations at the end of the step.
     pub seen: Range<usize>,
@@ -77,7 +77,7 @@ pub fn longest(first: &Step) -> usize {
 
 impl Rest {
     /// Navigates through these steps from the current state. Each step starts from the same state at rest, to which the
-    /// result of the previous step is referred; `held` is the attitude computed when the body came to rest.
+    /// result of the previous step is referred; `held` is the attitude that was computed when the body came to rest.
     pub fn navigate(
         navigator: &mut Navigator,
         (problem, stretch): (&Problem, &Stretch),

@@ -115,8 +115,9 @@ impl AtRest {
     /// Linearisation point at rest. With a table, this is the attitude from the previous pass or, in the first pass,
     /// the mean reading; without a table, it is the computed attitude after levelling.
     ///
-    /// Both attitudes are within arc seconds of the truth in every pass, so the noise accumulated over a long record
-    /// never leaves the linear range, and a tilt due to noise does not change the effect of a wrong heading.
+    /// In every pass, both attitudes are within arc seconds of the truth, so the noise accumulated over a long
+    /// recording never leaves the linear range, and a tilt caused by noise does not change the effect of a wrong
+    /// heading.
     pub fn tied(&self, computed: &State, accel: &Triad, known: Option<&Matrix3<f64>>) -> State {
         let of_table = self
             .dwell

@@ -27,7 +27,7 @@ impl Script {
     /// Navigates once through all stretches of a problem, linearised at this point.
     ///
     /// # Errors
-    /// [`CalibrationError::Singular`] if a triad cannot be inverted at this point.
+    /// Returns [`CalibrationError::Singular`] if a triad cannot be inverted at this point.
     pub fn new(
         problem: &Problem,
         priors: &[AttitudePrior],

@@ -51,7 +51,7 @@ impl Calibration {
     /// does not depend on temperature. A calibration without temperature dependence is returned unchanged.
     ///
     /// # Errors
-    /// If the temperature is out of range, or a coefficient has an unknown parameter.
+    /// Returns an error if the temperature is out of range, or a coefficient has an unknown parameter.
     pub fn at_temperature(&self, temperature: f64) -> Result<Self, TemperatureError> {
         let Some(thermal) = &self.temperature else {
             return Ok(self.clone());
@@ -73,7 +73,7 @@ impl Calibration {
     /// The calibration for these values of the functions of temperature.
     ///
     /// # Errors
-    /// If a coefficient belongs to no parameter.
+    /// Returns an error if a coefficient belongs to no parameter.
     pub fn in_state(&self, state: &ThermalState) -> Result<Self, TemperatureError> {
         let Some(thermal) = self.thermal()? else {
             return Ok(self.clone());

@@ -1,7 +1,7 @@
 //! A calibration as a file: `calibration.json` and `truth.json`.
 //!
 //! Values are in the file's quantity per second (see [`crate::imu::Nominal`]): `N = scale ⊙ (installation · u) + bias`,
-//! with `u` in rad/s or m/s² along right-front-up.
+//! with `u` in rad/s or m/s² along the right, front and up axes.
 
 pub(super) mod at_temperature;
 pub(super) mod correction;
@@ -24,9 +24,9 @@ use crate::calibration::{Direction, Finding, Quality, Verdict, Word};
 use crate::imu::{AXES, BodyFrame, InstallationForm, Nominal, Output, PerSensor, Sensor, Triad};
 use crate::run::Aiding;
 
-/// The version of the format.
+/// The version of the file format.
 pub const FORMAT: &str = "turncal-calibration/1";
-/// The version of the format with temperature dependence.
+/// The version of the file format with temperature dependence.
 pub const FORMAT_WITH_TEMPERATURE: &str = "turncal-calibration/2";
 
 /// The equation of a record.
@@ -38,7 +38,7 @@ pub const EQUATION_WITH_TERMS: &str = "N = scale * (installation * (u + t)) + bi
 
 /// A calibration with its accuracy and origin, or a known truth.
 ///
-/// Only the two triads are mandatory. Unknown fields are ignored when reading.
+/// Only the two triads are required. Unknown fields are ignored when reading.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Calibration {
     /// [`FORMAT`], or [`FORMAT_WITH_TEMPERATURE`].
@@ -59,7 +59,7 @@ pub struct Calibration {
     pub gyro: TriadRecord,
     /// The accelerometers.
     pub accel: TriadRecord,
-    /// Quantity of the file, such as `count`.
+    /// Unit of the file's quantity, such as `count`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<PerSensor<String>>,
     /// Quantity in a row of the file. For rates, N is the row; otherwise, N is the row divided by the sample period.
@@ -68,7 +68,7 @@ pub struct Calibration {
     /// Columns of the log along x, y and z of each triad, with a minus sign if the sign is reversed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub columns: Option<PerSensor<[String; 3]>>,
-    /// 1σ of every value, zero if fixed.
+    /// 1σ of every value; zero if the value is fixed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sigma: Option<PerSensor<TriadRecord>>,
     /// Names of the estimated parameters, such as `gyro.installation.xy`.
@@ -80,11 +80,12 @@ pub struct Calibration {
     /// Uncertainty budget of the parameters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub budget: Option<BudgetRecord>,
-    /// Parameters of error terms, such as `accel.second_order.x`, in SI, and errors of the table,
-    /// such as `table.base.up`, in rad, by name.
+    /// Parameters of error terms (such as `accel.second_order.x`, in SI units) and errors of the table (such as
+    /// `table.base.up`, in rad), by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub terms: BTreeMap<String, TermRecord>,
-    /// Temperature dependence; the values apply at the reference temperature. `None` without temperature dependence.
+    /// Temperature dependence; the values apply at the reference temperature. `None` if the parameters do not depend on
+    /// temperature.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature: Option<ThermalRecord>,
     /// Results of each recording, if there are several.
@@ -93,7 +94,7 @@ pub struct Calibration {
     /// Gravity at the site.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gravity: Option<GravityRecord>,
-    /// Number of passes over the record.
+    /// Number of passes over the recording.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub passes: Option<usize>,
     /// Whether the filter converged.
@@ -111,7 +112,7 @@ pub struct Calibration {
     /// Independent directions of the parameters, the least observed first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub observability: Vec<Direction>,
-    /// The noise that was used; `None` if a file states noise of another kind, as in some truth files.
+    /// The noise that was used; `None` if the file states noise in another form, as some truth files do.
     #[serde(
         default,
         deserialize_with = "if_known",
@@ -121,10 +122,10 @@ pub struct Calibration {
     /// Whether the values may be used; `None` for values that were not estimated, such as a truth.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub verdict: Option<Verdict>,
-    /// Cautions about using the values.
+    /// Cautions for the use of the values.
     #[serde(default)]
     pub warnings: Vec<String>,
-    /// The warnings in structured form: kind, text, figures.
+    /// The warnings in structured form: kind, text and figures.
     #[serde(default)]
     pub findings: Vec<Finding>,
     /// Names of the parameters that were not estimated.
@@ -133,7 +134,7 @@ pub struct Calibration {
     /// The model in words, [`EQUATION`] or [`EQUATION_WITH_TERMS`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub equation: Option<String>,
-    /// The matrix of `u = correction (N − bias)`, ready to use.
+    /// The matrix in `u = correction (N − bias)`, ready to use.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub correction: Option<PerSensor<[[f64; 3]; 3]>>,
     /// Raw outputs with their calibrated values, with which users can test their own code.
@@ -157,7 +158,7 @@ pub struct Provenance {
     pub inputs: Vec<InputFile>,
     /// Nominal scales: the file's quantity per second for one rad/s or m/s².
     pub nominal: PerSensor<[f64; 3]>,
-    /// Latitude of the site, degrees; `None` if it is not known.
+    /// Latitude of the site, degrees; `None` if the latitude is not known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub latitude_deg: Option<f64>,
     /// Height of the site, m.
@@ -213,7 +214,7 @@ pub struct TermRecord {
 pub struct GravityRecord {
     /// Magnitude.
     pub m_s2: f64,
-    /// 1σ of gravity, which is common to the scale factors of all three accelerometers.
+    /// 1σ of gravity; the scale factors of all three accelerometers share this error.
     pub sigma_m_s2: f64,
 }
 
@@ -221,7 +222,7 @@ pub struct GravityRecord {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
-    /// Extended Kalman filter over the whole run
+    /// Extended Kalman filter that uses the whole run
     Ekf,
     /// Closed form from table positions, otherwise from labelled sections, otherwise from gravity
     SixPosition,
@@ -291,8 +292,8 @@ pub struct TestVector {
 }
 
 impl Word {
-    /// Name of a column that contains 1 in every row, such as `verdict_good`, because readers of a table of numbers
-    /// tolerate neither comments nor text.
+    /// Name of a column that contains 1 in every row, such as `verdict_good`. The verdict is in the name because
+    /// programs that read a table of numbers tolerate neither comments nor text.
     pub fn column(self) -> String {
         let word = self.to_string().to_lowercase();
         format!("verdict_{}", word.replace(' ', "_"))
@@ -412,8 +413,8 @@ impl TriadRecord {
         Matrix3::from_fn(|i, j| self.scale[i] * self.installation[i][j])
     }
 
-    /// The triad, normalised by nominal scales and split in a form. A record may contain any misalignment matrix, so
-    /// the split uses `K C`, which is common to all forms.
+    /// The triad, normalised by nominal scales and split into the parameters of a form. A calibration may contain any
+    /// misalignment matrix, so the split uses `K C`, which is the same in all forms.
     pub fn triad(&self, nominal: &Nominal, form: InstallationForm) -> Triad {
         let sensitivity = self.normalised(nominal);
         let bias = Vector3::from(self.bias).component_div(&nominal.0);

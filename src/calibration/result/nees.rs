@@ -1,4 +1,4 @@
-//! Consistency of an error with its covariance, correlations included.
+//! Consistency of an error with its covariance, including correlations.
 
 use faer::{Mat, Side};
 use nalgebra::{DMatrix, DMatrixView, DVector, DVectorView};
@@ -84,7 +84,7 @@ impl Directions {
             .collect()
     }
 
-    /// The inverse of the covariance along its directions, zero across them.
+    /// The inverse of the covariance in its own directions, and zero perpendicular to them.
     pub fn inverse(&self) -> DMatrix<f64> {
         let inverse = self.eigenvalues.map(|variance| {
             let is_direction = variance > NO_DIRECTION;

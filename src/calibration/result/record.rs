@@ -151,7 +151,7 @@ impl ClosedForm {
 }
 
 impl AtRest {
-    /// The partial calibration of an instrument at rest: gyro biases to within Earth rate, and the temperature
+    /// The partial calibration of an instrument at rest: gyro biases (accurate to Earth rate), and the temperature
     /// dependence of all biases; all other values come from the prior.
     pub fn record(&self, problem: &Problem) -> Calibration {
         let run = problem.run();

@@ -52,7 +52,7 @@ pub struct CoefficientRecord {
     /// The order of the polynomial; `None` for the rate term.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub order: Option<usize>,
-    /// Value, in the unit of the parameter.
+    /// The value, in the unit of the parameter.
     pub value: f64,
     /// 1σ.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -79,7 +79,7 @@ pub struct RecordingRecord {
 /// A value with its 1σ.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ValueRecord {
-    /// Value, in the unit of the parameter.
+    /// The value, in the unit of the parameter.
     pub value: f64,
     /// 1σ.
     pub sigma: f64,

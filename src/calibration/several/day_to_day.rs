@@ -14,8 +14,8 @@ use crate::units::ARCSEC;
 #[derive(Debug, Clone)]
 pub struct Turned {
     /// Derivatives with respect to the common parameters, one column per parameter. The poorly determined mean of all
-    /// mountings depends on well-determined quantities, so the accuracy of the derivatives must match the ratio of the
-    /// two.
+    /// mountings depends on well-determined quantities, so the relative accuracy of the derivatives must be better than
+    /// the ratio of their σ.
     pub by_parameters: ParameterMatrix,
     /// Derivatives with respect to the rotation about each body axis.
     pub by_mounting: SMatrix<f64, PARAMETERS, 3>,
@@ -60,7 +60,7 @@ impl DayToDay {
         self.parameters.amax() > 0.0 || self.mounting > 0.0
     }
 
-    /// The key of a group in a campaign's `[day_to_day]`, and its unit in SI.
+    /// The key of a parameter group in `[day_to_day]` of a campaign, and its unit in SI.
     pub fn key(group: Group) -> (String, f64) {
         let entry = group.entry();
         (

@@ -42,7 +42,7 @@ impl Outcome {
     }
 
     /// Squared normalised distance between a recording calibrated alone and the joint calibration, per parameter, and
-    /// its limit at a false-alarm rate of 0.1 %. `None` if the recording gives no calibration alone.
+    /// its limit at a false-alarm rate of 0.1 %. Returns `None` if the recording alone gives no calibration.
     pub fn distance_alone(&self, number: usize) -> Option<(f64, f64)> {
         let alone = self.alone.get(number)?;
         let off = self.departure(number, alone)?;

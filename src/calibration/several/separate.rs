@@ -30,7 +30,7 @@ pub struct SeparateEstimate {
     pub name: String,
     /// Mean temperature of each axis, °C, and its rate, K/s, over its dwells; `None` if unknown.
     pub temperature: Option<PerSensor<[f64; 3]>>,
-    /// The span of the temperatures in the recording, K.
+    /// The temperature range within the recording, K.
     pub span: f64,
     /// Calibration at the mean temperature; `None` if the calibration failed.
     pub estimate: Option<Estimate>,

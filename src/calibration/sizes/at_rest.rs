@@ -1,7 +1,7 @@
 //! Estimation of the noise at rest from the dwells alone.
 //!
-//! Each part of a dwell has its own free initial states and constant rates and forces, so the residuals show white
-//! noise, sway and rotation by hand independently of the parameters.
+//! Each part of a dwell has its own free initial states and its own constant rates and forces, so the residuals show
+//! white noise, sway and rotation by hand independently of the parameters.
 
 use std::convert::Infallible;
 

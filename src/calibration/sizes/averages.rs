@@ -40,7 +40,7 @@ pub struct Average {
     /// Covariance between the cases of each group, multiplied from both sides by the inverse covariance within the
     /// cases.
     pub between: DMatrix<f64>,
-    /// Probability that each group is absent.
+    /// Probability of absence for each group.
     pub absent: Vec<f64>,
     /// The same, without data.
     prior_absent: Vec<f64>,
@@ -53,8 +53,8 @@ struct Moments {
 }
 
 impl Average {
-    /// A start in which every group is present, with this size divided by the usual size, and its prior probability of
-    /// absence.
+    /// A starting point in which every group is present, with this size divided by the usual size, and with its prior
+    /// probability of absence.
     pub fn begun(groups: &[Vec<usize>], sizes: &[f64], prior_absent: Vec<f64>) -> Self {
         let n = groups.iter().map(Vec::len).sum();
         let mut precision = DMatrix::zeros(n, n);
@@ -71,8 +71,8 @@ impl Average {
         }
     }
 
-    /// The average, given the information from the data on all groups, computed from this average as a start. Each
-    /// group is given by its positions among the constants. `None` if the covariance of a group is not positive
+    /// The average, given the information on all groups from the data; the calculation starts from this average. Each
+    /// group is given by its positions among the constants. Returns `None` if the covariance of a group is not positive
     /// definite.
     pub fn given(mut self, data: &Information, groups: &[Vec<usize>]) -> Option<Self> {
         for _ in 0..ROUNDS {

@@ -21,7 +21,7 @@ pub struct Slope {
 }
 
 impl Slope {
-    /// A point where the cost is not defined.
+    /// A point at which the cost is not defined.
     pub fn nowhere(size: usize) -> Self {
         Self {
             cost: f64::INFINITY,

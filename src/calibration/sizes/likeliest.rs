@@ -93,7 +93,7 @@ impl<'a> Search<'a> {
     /// Each step lowers the cost.
     ///
     /// # Errors
-    /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
+    /// Returns [`CalibrationError::Diverged`] if a covariance is not positive definite.
     pub fn likeliest(&self, start: At, sites: &Sites) -> Result<Here<'a>, CalibrationError> {
         let mut here = self.here(start, sites)?;
         for _ in 0..STEPS {
@@ -165,9 +165,9 @@ impl Here<'_> {
 }
 
 impl At {
-    /// The usual sizes, with slips as large as position errors. A slip that explains as much as all later positions is
-    /// thus tried first, and shrinks if it is not needed (graduated non-convexity: Blake and Zisserman, *Visual
-    /// Reconstruction*, ch. 7).
+    /// The usual sizes, with slips as large as position errors. The search thus first tries a slip that explains as
+    /// much as all later positions, and reduces the size if slips are not needed (graduated non-convexity: Blake and
+    /// Zisserman, *Visual Reconstruction*, ch. 7).
     pub fn usual(usual: &[Usual], chain: &Chain) -> Self {
         let drives = chain.links.iter().flat_map(|link| &link.transition.drives);
         let slips = drives.filter(|drive| matches!(drive.effect, Effect::Slip(_)));

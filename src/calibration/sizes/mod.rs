@@ -43,11 +43,11 @@ struct Size {
 /// Distance of a linearisation point from the estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stage {
-    /// The point is far: errors of the linearisation dominate the residuals.
+    /// The point is far from the estimate: errors of the linearisation dominate the residuals.
     Far,
-    /// The point is near for the first time.
+    /// The point is near the estimate for the first time.
     FirstNear,
-    /// The point is near, as in the previous pass.
+    /// The point is near the estimate, as in the previous pass.
     Near,
 }
 
@@ -88,7 +88,7 @@ impl Effects {
     /// Improves the sizes at a linearisation point; once the point is near, in several rounds.
     ///
     /// # Errors
-    /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
+    /// Returns [`CalibrationError::Diverged`] if a covariance is not positive definite.
     pub fn improve(
         &mut self,
         problem: &Problem,
@@ -188,7 +188,7 @@ impl Effects {
     /// The chain at a linearisation point.
     ///
     /// # Errors
-    /// [`CalibrationError::Diverged`] if a part of a dwell cannot be reduced.
+    /// Returns [`CalibrationError::Diverged`] if a part of a dwell cannot be reduced.
     pub fn chain(&self, problem: &Problem, script: &Script) -> Result<Chain, CalibrationError> {
         let made = problem.with(|model| self.set(model, |_| 0.0));
         Chain::new(&made, script, &self.dispersion)
@@ -197,7 +197,7 @@ impl Effects {
     /// Information on the constants from a filter with these sizes between dwells.
     ///
     /// # Errors
-    /// [`CalibrationError::Diverged`] if a part cannot be reduced, or a covariance is not positive definite.
+    /// Returns [`CalibrationError::Diverged`] if a part cannot be reduced, or a covariance is not positive definite.
     pub fn information(
         &self,
         problem: &Problem,
@@ -211,7 +211,7 @@ impl Effects {
     /// A chain with its sizes and its information on the constants.
     ///
     /// # Errors
-    /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
+    /// Returns [`CalibrationError::Diverged`] if a covariance is not positive definite.
     pub fn weighed<'a>(
         &self,
         chain: &'a Chain,
@@ -236,7 +236,7 @@ impl Effects {
     /// Does the same as [`Self::weighed`] for some of the rows, and averages the candidates again.
     ///
     /// # Errors
-    /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
+    /// Returns [`CalibrationError::Diverged`] if a covariance is not positive definite.
     pub fn weighed_anew<'a>(
         &self,
         chain: &'a Chain,
@@ -324,7 +324,7 @@ impl Effects {
     /// Differences between recordings beyond the stated ones, from a chain with these sizes.
     ///
     /// # Errors
-    /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
+    /// Returns [`CalibrationError::Diverged`] if a covariance is not positive definite.
     pub fn differences(
         &self,
         of: &Weighed,

@@ -7,7 +7,7 @@ use crate::calibration::record::script::Moves;
 use crate::calibration::{Group, Model, Problem, Source};
 use crate::run::Aiding;
 
-/// Prior 1σ of the log σ of a stated figure: a factor of three.
+/// Prior 1σ of the logarithm of a stated σ: a factor of three.
 pub const LOG_SIGMA: f64 = 1.098_612_288_668_109_8;
 /// Prior 1σ of the log σ of an unstated figure, about the effect of white noise: a factor of ten.
 const LOG_SIGMA_NOT_STATED: f64 = std::f64::consts::LN_10;

@@ -82,7 +82,8 @@ impl ClosedForm {
 /// positions, least squares gives the half sums and half differences of the paper.
 ///
 /// # Errors
-/// [`CalibrationError`] if there is no dwell. Parameters that the positions do not determine keep their prior.
+/// Returns [`CalibrationError`] if there is no dwell. Parameters that the positions do not determine keep their prior
+/// values.
 pub fn six_position(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
     let sections = &problem.run().recording.segments;
     let reference = if problem.model.aiding == Aiding::Table {

@@ -53,7 +53,7 @@ impl CoarseStart {
 /// gyros from the gravity direction before and after each move, and gyro biases and heading from the rates at rest.
 ///
 /// # Errors
-/// [`CalibrationError`] if there is no dwell, or data and prior contradict each other.
+/// Returns [`CalibrationError`] if there is no dwell, or data and prior contradict each other.
 pub fn coarse_start(problem: &Problem) -> Result<CoarseStart, CalibrationError> {
     let dwells = dwells(problem)?;
     if let Some(attitudes) = attitudes_of_table(problem) {

@@ -116,7 +116,8 @@ pub struct Equations {
     pub sigma: DVector<f64>,
     pub rows: Vec<Rows<1>>,
     pub events: Vec<Event>,
-    /// Whether [`Self::solved`] weights rows by the inverse of their full covariance instead of their variances.
+    /// Whether [`Self::solved`] uses the inverse of the full covariance of the rows as weight, and not only their
+    /// variances.
     pub correlated: bool,
 }
 

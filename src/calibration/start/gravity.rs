@@ -173,7 +173,7 @@ pub struct Heading {
     pub stretch: usize,
     /// Rotation about Up that aligns the attitudes with East-North-Up, rad.
     pub turn: Matrix3<f64>,
-    /// 1σ of the heading, rad; above one, the heading is unknown.
+    /// 1σ of the heading, rad; a value above one means that the heading is unknown.
     pub sigma: f64,
 }
 

@@ -23,11 +23,11 @@ pub struct Solution {
 }
 
 impl Equations {
-    /// Least-squares δθ with the prior, where rows are weighted by their variances times the Birge ratio. If the noise
-    /// is understated, rows must not move parameters that they hardly show far from the prior.
+    /// Least-squares δθ with the prior; the weight of a row is the inverse of its variance times the Birge ratio. If
+    /// the noise is understated, rows must not move parameters that they hardly determine far from the prior.
     ///
     /// # Errors
-    /// [`CalibrationError::Singular`] with the triad of an unknown that is not a number.
+    /// Returns [`CalibrationError::Singular`] with the triad of an unknown that is not a number.
     pub fn step(&self) -> Result<ParameterVector, CalibrationError> {
         let Some(&first) = self.unknown.first() else {
             return Ok(ParameterVector::zeros());

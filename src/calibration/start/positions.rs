@@ -33,7 +33,8 @@ pub struct Position {
     pub output: Vector3<f64>,
     /// Variance of each output axis, (rad/s)² or (m/s²)².
     pub variance: Vector3<f64>,
-    /// Variance that sets the weight of the position: `variance`, unless this value would give too much weight.
+    /// Variance from which the weight of the position is computed: `variance`, or a larger value if this one would give
+    /// too much weight.
     pub weighted: Vector3<f64>,
 }
 
@@ -144,7 +145,8 @@ impl Observed {
             .ok_or(CalibrationError::Singular { sensor })
     }
 
-    /// Estimates one triad from positions; uses the prior if the positions do not determine every parameter better.
+    /// Estimates one triad from positions; if the positions do not determine every parameter to better than its prior
+    /// σ, also uses the prior.
     pub fn fitted(&self, model: &Model) -> Result<Fit, CalibrationError> {
         let first = parameter(self.sensor, 0);
         let sigma = model.prior_sigma.fixed_rows::<PER_TRIAD>(first);
@@ -166,7 +168,8 @@ impl Observed {
     }
 
     /// Estimates one triad from positions alone, by least squares for `A = K C` and `D` row by row; the misalignment
-    /// form then splits A. `None` for fewer than four positions, or for positions that leave a row undetermined.
+    /// form then splits A. Returns `None` if there are fewer than four positions, or if the positions leave a row
+    /// undetermined.
     pub fn determined(&self, form: InstallationForm) -> Option<Fit> {
         let mut rows = TriadVector::from_column_slice(Matrix4x3::identity().as_slice());
         let mut equations = self.of_sensitivity(sensitivity_and_bias(&rows));
@@ -236,8 +239,8 @@ fn in_a_plane(equations: &Equations) -> bool {
 }
 
 /// Estimates one triad from positions without common errors, by least squares for `A = K C` and `D` row by row; the
-/// misalignment form then splits A. Returns the triad and the covariance of its parameters; `None` for fewer than four
-/// positions, or for positions that leave a row undetermined.
+/// misalignment form then splits A. Returns the triad and the covariance of its parameters; Returns `None` if there are
+/// fewer than four positions, or if the positions leave a row undetermined.
 pub fn six_position_triad(
     positions: &[Position],
     form: InstallationForm,

@@ -44,8 +44,8 @@ pub struct TermEntry {
     /// Default 1σ of each parameter, in `unit`: ten
     /// times the value of precise instruments.
     pub usual_sigma: f64,
-    /// Largest possible parameter, in SI units. Its effect equals gravity, or a rate of [`REFERENCE_RATE`] (larger than
-    /// in any real instrument).
+    /// Largest possible parameter, in SI units. The effect of this parameter equals gravity, or a rate of
+    /// [`REFERENCE_RATE`] (larger than in any real instrument).
     pub largest: f64,
     /// Names of the term's parameters in files: the common prefix and the suffixes.
     pub parameters: (&'static str, &'static [&'static str]),

@@ -10,9 +10,9 @@ use crate::imu::Sensor;
 pub const ENTRY: TermEntry = TermEntry {
     name: "time-offset",
     title: "accel time offset",
-    help: "Accelerometers: delay of their samples relative to the gyros",
+    help: "Accelerometers: delay of the accelerometer samples relative to the gyro samples",
     adds: "-q w x f to f, accelerometers sampled later",
-    shown_by: "fast turns about level axes",
+    shown_by: "fast turns about horizontal axes",
     sensor: Sensor::Accel,
     unit: ("ms", 1e-3),
     si_unit: "s",

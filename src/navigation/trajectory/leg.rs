@@ -80,7 +80,7 @@ impl Leg {
         self.changes[HEIGHT].peak_rate()
     }
 
-    /// The next time at which a third derivative jumps or, if there is none, the end of the leg.
+    /// The time of the next jump of a third derivative; if there is none, the end of the leg.
     pub fn next_break(&self, after: f64) -> f64 {
         self.changes
             .iter()

@@ -17,7 +17,7 @@ pub struct Start {
     pub speed: f64,
 }
 
-/// A segment, whose changes start together. The segment ends when the last change ends.
+/// A segment; all its changes start together. The segment ends when the last change ends.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Segment {
     /// Minimum duration, s.

@@ -82,8 +82,8 @@ impl Strides<'_> {
         self.leg.at(time).instant(place, self.trajectory.banks)
     }
 
-    /// Continues until the given time, in s since the start, and passes every stride to the caller. The computed
-    /// solution rotates at `beside` rad/s relative to the body.
+    /// Continues until the given time, in s since the start, and passes each step to the caller. The computed solution
+    /// rotates relative to the body at `beside` rad/s.
     ///
     /// # Errors
     /// The first error returned for a stride.

@@ -11,7 +11,7 @@ pub struct Fault {
     pub kind: FaultKind,
     /// Triad and body axis (right, front, up); `None` if whole rows are affected.
     pub axis: Option<(Sensor, usize)>,
-    /// The samples; for a duplicate, the sample that is repeated in the file.
+    /// The faulty samples; for a duplicate, the sample that is repeated in the file.
     pub samples: Range<usize>,
     /// Line in the file: the line of the first sample, of the second of two equal rows, or of the last row before
     /// missing rows.
@@ -27,7 +27,7 @@ pub enum FaultKind {
     Missing,
     /// A copy of the previous row, including its time stamp.
     Duplicate,
-    /// Values at the end of the axis' range; the true value may lie beyond.
+    /// Values at the end of the range of the axis; the true value may be beyond this end.
     Saturated,
     /// A repeated value, although the axis' noise or motion continues.
     Stuck,

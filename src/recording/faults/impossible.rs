@@ -13,8 +13,8 @@ const FASTEST: f64 = 1000.0;
 const LARGEST_FORCE: f64 = 1e4;
 
 /// Rows that exceed the range of any instrument at nominal scales, and rows that are zero in all columns although
-/// gravity exceeds the smallest step, in row order. If most rows are impossible, no rows of that kind are returned,
-/// because a wrong unit is then the cause.
+/// gravity exceeds the smallest step, in row order. If most rows are impossible, no rows of this kind are returned,
+/// because the cause is then a wrong unit.
 pub fn impossible(rows: &Rows) -> Vec<FaultyRows> {
     let count = rows.columns[0].len();
     let found = |kind, column, is: &dyn Fn(usize) -> bool| {

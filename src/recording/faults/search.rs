@@ -1,4 +1,4 @@
-//! Search for faulty rows by comparison with the other rows.
+//! Searches for faulty rows by comparing them with the other rows.
 
 use std::ops::Range;
 

@@ -24,8 +24,8 @@ pub fn copied(run: &Run) -> Option<String> {
         words.collect()
     })?;
     Some(format!(
-        "These columns are equal in every row: {pairs}. A column is named twice or was copied; correct the column \
-         names in run.toml."
+        "The values of these columns are equal in every row: {pairs}. The same column was named or copied twice; \
+         correct the column names in run.toml."
     ))
 }
 
@@ -44,8 +44,8 @@ pub fn dead(run: &Run) -> Option<String> {
         words.collect()
     })?;
     Some(format!(
-        "These columns never change ({} rows), although their noise should make them vary: {axes}. The axis is dead, \
-         or run.toml names the wrong column.",
+        "These columns never change ({} rows), although their noise should make them vary: {axes}. Either the axis is \
+         dead, or run.toml names the wrong column.",
         imu.len()
     ))
 }

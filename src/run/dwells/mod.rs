@@ -22,8 +22,8 @@ impl Run {
     /// The dwells, in order of time.
     ///
     /// The standstills of a table log are checked against the gyros. A standstill during which the gyros turn is not a
-    /// dwell, because two readings may miss a full turn. Two standstills without a turn in between are merged, because
-    /// only a wild reading or a knock separated them.
+    /// dwell, because two readings may miss a full turn. Two standstills without a turn between them are merged,
+    /// because they were separated only by an outlier or a knock.
     pub fn dwells(&self, aiding: Aiding) -> Vec<Dwell> {
         let imu = &self.recording.imu;
         if imu.is_of_means() {

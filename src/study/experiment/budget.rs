@@ -10,8 +10,9 @@ pub(super) type ByParameter = SMatrix<f64, 2, PARAMETERS>;
 
 /// Budget of the final position error from the stated covariance, averaged over all instruments.
 ///
-/// The errors of groups are correlated, because the filter determines many sums better than their terms. The share of a
-/// group is the covariance of its contribution with the total, divided by the variance of the total,
+/// The errors of groups are correlated, because the filter determines many sums of parameters better than the
+/// individual parameters. The share of a group is the covariance of its contribution with the total, divided by the
+/// variance of the total,
 ///
 /// ```text
 /// share_g = tr(S_g P_g· Sᵀ) / tr(S P Sᵀ)

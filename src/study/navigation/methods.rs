@@ -20,7 +20,7 @@ pub struct MethodOutlook {
 /// calibrations. The truth may be unknown.
 ///
 /// # Errors
-/// [`NavigationStudyError`] if the site is at a pole or a calibration is singular.
+/// Returns [`NavigationStudyError`] if the site is at a pole or a calibration is singular.
 pub fn navigate_with_each(
     site: &Site,
     methods: &[(&'static str, &Estimate)],

@@ -21,9 +21,9 @@ const DURATIONS: [f64; 17] = [
 const MOMENTS: f64 = 20.0;
 
 impl Mission {
-    /// A stationary and level mission at a site, whose duration suits the grade of the instrument. This is the longest
-    /// round duration after which the predicted errors of every estimate are still small, from seconds (low grade) to
-    /// hours (navigation grade).
+    /// A mission in which the body is stationary and level at a site; its duration suits the grade of the instrument.
+    /// The duration is the longest round duration after which the predicted errors of every estimate are still small;
+    /// it ranges from seconds (low grade) to hours (navigation grade).
     ///
     /// # Errors
     /// The errors of [`Self::navigate`].
@@ -78,7 +78,7 @@ impl Mission {
     /// misalignment form.
     ///
     /// # Errors
-    /// As for [`Self::navigate`].
+    /// The same errors as [`Self::navigate`].
     pub fn outlook(
         &self,
         estimate: &Estimate,

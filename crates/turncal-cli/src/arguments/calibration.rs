@@ -1,4 +1,4 @@
-//! A calibration whose values a command uses.
+//! A calibration whose values are used by a command.
 
 use std::path::Path;
 
@@ -17,8 +17,8 @@ pub fn usable(path: &Path, temperature: Option<f64>, force: bool) -> anyhow::Res
         let cause = printable(&cause(&record));
         if !force {
             bail!(
-                "{name}: the verdict is FAILED ({cause}), so its values must not be used. Calibrate again; --force \
-                 uses the values anyway"
+                "{name}: the verdict is FAILED ({cause}), so its values must not be used. Calibrate again, or add \
+                 --force to use the values anyway"
             );
         }
         tell!("warning: {name}: the verdict is FAILED ({cause}); do not use these values");

@@ -1,4 +1,4 @@
-//! A file of kept rows to which new rows are added.
+//! A file of saved rows to which new rows are added.
 
 use std::fs::File;
 use std::io::{self, ErrorKind, Read, Seek, SeekFrom};
@@ -25,7 +25,7 @@ impl Continued {
     /// The file, unless it is empty or missing.
     ///
     /// # Errors
-    /// If the file cannot be read, or if its last line is not a row of numbers.
+    /// Returns an error if the file cannot be read, or if its last line is not a row of numbers.
     pub fn of(log: &Path) -> anyhow::Result<Option<Self>> {
         let mut file = match File::open(log) {
             Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),

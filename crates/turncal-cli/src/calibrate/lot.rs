@@ -132,7 +132,7 @@ impl Calibrate {
     }
 }
 
-/// Opens the directory of a lot, and prints a note if another process must finish first.
+/// Opens the directory of a lot; prints a note if it has to wait for another process.
 pub fn open_directory(
     target: &Path,
     part: &Part,

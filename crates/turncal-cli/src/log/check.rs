@@ -7,12 +7,12 @@ use crate::terminal::Activity;
 use turncal::survey::Survey;
 use turncal_report::check;
 
-/// Describes a run and the parameters that each method could observe
+/// Describes a run and the parameters that each method could determine
 ///
-/// Does not calibrate. Shows the rate, jitter, faults and resolution of the log; dwells with their upward axis; turns
-/// with axis and angle; labelled sections compared with dwells and turns; the predicted σ of each method and the
-/// parameters that the method would not observe; and recommended changes. Problems in the run do not change the exit
-/// status.
+/// Without calibrating, shows the rate, jitter, faults and resolution of the log; the dwells with their upward axis;
+/// the turns with their axis and angle; how labelled sections agree with dwells and turns; the σ predicted for each
+/// method and the parameters that the method could not determine; and recommended changes. Problems in the run do not
+/// change the exit status.
 #[derive(Debug, clap::Args)]
 #[command(mut_arg("output", |output| output.help("Directory for the report and a figure of the recording")))]
 #[command(after_help = "Examples:

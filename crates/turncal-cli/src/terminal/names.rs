@@ -1,4 +1,4 @@
-//! Names of files in tables and messages.
+//! File names for tables and messages.
 
 use std::ffi::OsStr;
 use std::path::Path;

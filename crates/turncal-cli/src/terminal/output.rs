@@ -44,7 +44,7 @@ pub fn columns() -> Option<u16> {
     terminal.or_else(|| std::env::var("COLUMNS").ok()?.parse().ok())
 }
 
-/// Writes to standard output. A closed pipe, as with `head`, is not a failure.
+/// Writes to standard output. A closed pipe, as with `head`, is not an error.
 pub fn print(bytes: &[u8]) -> anyhow::Result<()> {
     stream(|stdout| stdout.write_all(bytes))
 }

@@ -1,4 +1,4 @@
-//! Progress display on a terminal; nothing is shown if standard error is a file or a pipe.
+//! Progress display on a terminal; if standard error is a file or a pipe, nothing is shown.
 
 use std::sync::mpsc::{self, RecvTimeoutError, Sender};
 use std::thread;
@@ -32,7 +32,7 @@ impl Activity {
         self.bar.set_message(printable(&message.into()));
     }
 
-    /// Shows a pass of the filter.
+    /// Shows that the filter performs a pass.
     pub fn pass(&self, pass: &Pass) {
         let step = pass.largest_step;
         self.next(format!("iteration done, largest step {step:.2} σ"));

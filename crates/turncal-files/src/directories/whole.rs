@@ -1,7 +1,7 @@
-//! Output that is complete or absent: it is written next to its target and then renamed.
+//! Output that is either complete or absent: turncal writes it next to its target and then renames it.
 //!
-//! A process that ends on a signal removes unfinished output ([`Unfinished`]); leftovers of a killed process
-//! are removed when the next output is started there.
+//! A process that is ended by a signal removes unfinished output ([`Unfinished`]); the leftovers of a killed process
+//! are removed when the next output is started in the same place.
 
 mod manifest;
 mod stage;
@@ -97,8 +97,8 @@ impl WholeDirectory {
     }
 }
 
-/// Writes the list of a growing directory, which states that only these names belong to turncal. Entries that end in
-/// `/` are directories with their own list. Files named only in the previous list are deleted.
+/// Writes the list of a growing directory; it states that only these names belong to turncal. Entries that end in `/`
+/// are directories with their own list. Files that are named only in the previous list are deleted.
 pub fn list_anew(directory: &Path, names: &[&str]) -> Result<(), FileError> {
     for old in manifest::listed_files(directory) {
         let still = |name: &&str| old.file_name() == Some(name.as_ref());
@@ -111,7 +111,7 @@ pub fn list_anew(directory: &Path, names: &[&str]) -> Result<(), FileError> {
     write_whole(&directory.join(manifest::FILE), list.as_bytes(), true)
 }
 
-/// Removes unfinished output of a killed process from a directory.
+/// Removes the unfinished output of a killed process from a directory.
 pub fn clear_abandoned(directory: &Path) {
     stage::remove_abandoned(directory);
 }
@@ -130,7 +130,8 @@ fn only_output(directory: &Path) -> Result<(), FileError> {
     })
 }
 
-/// Writes a complete file or none. An existing file is replaced only with `force`; a directory is never replaced.
+/// Writes a file completely or not at all. An existing file is replaced only with `force`; a directory is never
+/// replaced.
 pub fn write_whole(path: &Path, bytes: &[u8], force: bool) -> Result<(), FileError> {
     write_whole_with(path, force, |mut file| file.write_all(bytes))
 }

@@ -14,17 +14,17 @@ use turncal::imu::{PerSensor, Sensor};
 pub struct Columns {
     pub names: Vec<String>,
     pub time: Option<usize>,
-    /// Nanoseconds in addition to a time in whole seconds.
+    /// Column of nanoseconds to be added to a time column in whole seconds.
     pub nanoseconds: Option<usize>,
     pub triads: PerSensor<Option<[usize; 3]>>,
-    /// Other candidates for the triads.
+    /// Other candidates for the gyro and accelerometer triads.
     pub others: PerSensor<Vec<[usize; 3]>>,
     /// Whether the triads were identified by their values, because the column names are not informative.
     pub by_size: bool,
-    /// Why triads identified by their values are only a guess.
+    /// Reasons why triads that were identified by their values are only a guess.
     pub doubt: Option<Doubt>,
     pub temperature: Option<usize>,
-    /// Four columns whose norm is one (a quaternion).
+    /// Four columns that form a quaternion, because their norm is one.
     pub quaternion: Option<[usize; 4]>,
 }
 
@@ -134,7 +134,7 @@ impl Columns {
         })
     }
 
-    /// Rows with numeric triads, and their samples; zeros for a missing triad.
+    /// Rows in which both triads are numeric, and their samples; a missing triad has zeros.
     pub fn samples(&self, sheet: &Sheet) -> Option<(Vec<usize>, Samples)> {
         let at = |sensor: Sensor, row: usize| match self.triads.get(sensor) {
             Some(columns) => Vector3::from(columns.map(|k| sheet.columns[k][row])),
@@ -170,7 +170,7 @@ pub fn named(sheet: &Sheet, sensor: Sensor) -> Vec<usize> {
     (0..sheet.names.len()).filter(is).collect()
 }
 
-/// Whether the column names show that gyros and accelerometers have separate rows.
+/// Whether the column names show that gyros and accelerometers are in separate rows.
 pub fn have_rows_of_their_own(sheet: &Sheet) -> bool {
     let places = PerSensor::from_fn(|sensor| named(sheet, sensor));
     let (mut both, mut one) = (0, 0);
@@ -192,7 +192,7 @@ fn varies(values: &[f64]) -> bool {
     first.is_some_and(|first| values.any(|value| value != first))
 }
 
-/// Name and value of the first column that has the name of a time but never changes.
+/// Name and value of the first column whose name is that of a time, but whose value never changes.
 pub fn standing_time(sheet: &Sheet) -> Option<(&str, f64)> {
     let mut columns = sheet.names.iter().zip(&sheet.columns);
     let stands = |(name, values): &(&String, &Vec<f64>)| {
@@ -246,7 +246,7 @@ fn split_time(sheet: &Sheet, names: &[Name]) -> Option<[usize; 2]> {
     Some([pair, pair + 1])
 }
 
-/// The column that distinguishes several instruments, with its value for the first instrument.
+/// The column that distinguishes several instruments, with its value for the first of them.
 pub fn instance(sheet: &Sheet) -> Option<(usize, f64)> {
     let tells = |k: &usize| {
         let mut known: Vec<f64> = Vec::new();

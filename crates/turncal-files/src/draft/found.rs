@@ -1,4 +1,4 @@
-//! Fields detected in a log, with their certainty.
+//! Fields detected in a log, and how certain they are.
 
 use std::path::Path;
 
@@ -23,7 +23,7 @@ pub struct Found {
 }
 
 impl Draft {
-    /// All detected fields, in the order of the display.
+    /// All detected fields, in the order in which they are displayed.
     pub fn found(&self) -> Vec<Found> {
         vec![
             self.time_found(),
@@ -56,7 +56,7 @@ impl Draft {
             self.columns.triads.accel.is_some() && !self.motion.as_ref().is_some_and(is_zero);
         let why = match &*field {
             "gyro_unit" if !has_accels => {
-                "no columns were recognised as accelerometers that measure gravity".to_owned()
+                "no columns recognised as accelerometers that measure gravity".to_owned()
             }
             _ => why,
         };
@@ -99,13 +99,13 @@ impl Draft {
                 (None, word) => format!("used {}", word?),
             };
             Some(format!(
-                "The unit of the {name} rows is not clear: {why}. turncal {found}. Check --rate, and state \
+                "The unit of the {name} rows is uncertain: {why}. turncal {found}. Check --rate, and state \
                  --{name}-unit."
             ))
         });
         let left_out = self.left_out.map(|_| {
-            "turncal left out the gyros because their unit cannot be determined: the sensor was not turned. To \
-             estimate the gyro biases, add --gyro-unit."
+            "turncal left out the gyros because their unit cannot be determined without turns. To estimate the gyro \
+             biases, add --gyro-unit."
                 .to_owned()
         });
         let of_clock = self.clock.doubt.clone().into_iter();
@@ -119,7 +119,7 @@ impl Draft {
                 "time",
                 "none",
                 Certainty::Guess,
-                "each row is the mean of one position",
+                "each row is the mean of the output in one position",
             );
         }
         let name = self.columns.time.map(|k| self.columns.names[k].as_str());
@@ -194,7 +194,7 @@ impl Draft {
             return Found::new("place", place.join(", "), Certainty::Certain, "as stated");
         }
         let gravity = "gravity 9.806 ± 0.015 m/s²";
-        let why = "set --latitude and --height for smaller σ";
+        let why = "to reduce the σ, set --latitude and --height";
         Found::new("place", gravity, Certainty::Unknown, why)
     }
 }

@@ -1,4 +1,5 @@
-//! A draft of `run.toml` for a log without one: detected fields with reasons, and open fields for the user.
+//! A draft of `run.toml` for a log that has none: detected fields with reasons, and open fields for the user to
+//! complete.
 
 mod columns;
 mod convert;
@@ -39,7 +40,7 @@ use units::Quantities;
 /// Minimum number of samples at rest for a noise estimate.
 const FEWEST_AT_REST: usize = 64;
 
-const NO_COLUMNS: &str = "not recognised by name or values";
+const NO_COLUMNS: &str = "not recognised by their names or values";
 const AXES_OF_PROGRAM: &str = "axis convention of the program that wrote the log";
 
 /// Information about the instrument and its recording, found in a log.
@@ -78,15 +79,15 @@ impl Draft {
     /// Examines a file of rows.
     ///
     /// # Errors
-    /// [`FileError`] if the file cannot be read or has too few rows.
+    /// Returns [`FileError`] if the file cannot be read or has too few rows.
     pub fn of_file(path: &Path) -> Result<Self, FileError> {
         Self::of_stream(&path.into(), None, &Stated::default())
     }
 
-    /// Examines one stream of a log, with statements about it.
+    /// Examines one stream of a log, using the information that the user gave about it.
     ///
     /// # Errors
-    /// [`FileError`] if the file cannot be read or has too few rows.
+    /// Returns [`FileError`] if the file cannot be read or has too few rows.
     pub fn of_stream(
         file: &DataFile,
         stream: Option<&str>,
@@ -140,16 +141,16 @@ impl Draft {
         Ok(draft)
     }
 
-    /// Whether the gravity direction does not change, as in the log of one position.
+    /// Whether the gravity direction never changes, as in a log of one position.
     pub fn is_of_one_position(&self) -> bool {
         let stays = |motion: &Motion| !motion.is_turned && motion.cuts.is_empty();
         self.motion.as_ref().is_some_and(stays)
     }
 
-    /// Takes over the units of another log of the same sensor.
+    /// Adopts the units of another log of the same sensor.
     ///
     /// # Errors
-    /// [`FileError`] if the columns differ from those of the other log.
+    /// Returns [`FileError`] if the columns differ from those of the other log.
     pub fn as_in(&mut self, file: &Path, other: &Self) -> Result<(), FileError> {
         let names = |of: &Self| of.columns.names.join(", ");
         if self.columns.names != other.columns.names {
@@ -167,7 +168,8 @@ impl Draft {
         Ok(())
     }
 
-    /// Leaves out the gyros if nothing shows their unit; the accelerometers are then calibrated with gravity alone.
+    /// Leaves out the gyros if their unit cannot be determined; the accelerometers are then calibrated with gravity
+    /// alone.
     pub fn leave_out_gyros(&mut self) {
         let knows = |sensor| self.quantities.units.get(sensor).word.is_some();
         if !knows(Sensor::Gyro) && knows(Sensor::Accel) && self.columns.triads.accel.is_some() {
@@ -179,7 +181,7 @@ impl Draft {
     /// in the draft.
     ///
     /// # Errors
-    /// [`FileError`] if a file cannot be read, has too few rows, or lacks its triad or a time.
+    /// Returns [`FileError`] if a file cannot be read, has too few rows, or lacks its triad or a time.
     pub fn of_two_files(
         gyro: &DataFile,
         accel: &DataFile,
@@ -328,7 +330,8 @@ impl Draft {
     }
 }
 
-/// Angle in rad per gyro unit in one row, from the rotation of gravity; negative if the triads have opposite signs.
+/// Angle in rad for one gyro unit in one row, determined from the rotation of gravity; negative if the triads have
+/// opposite signs.
 pub fn turned_angle(triads: PerSensor<Vec<Vector3<f64>>>, period: f64) -> Option<f64> {
     RawSamples::new(triads, Vec::new(), period).motion().angle
 }
@@ -346,7 +349,7 @@ fn no_time(sheet: &Sheet, columns: &Columns, clock: &Clock) -> Option<[String; 3
     Some([
         format!("{value} in all rows of the column `{name}`"),
         "times that increase".to_owned(),
-        "Log the time of each row, or set --rate.".to_owned(),
+        "Log the time of each row, or give the sample rate with --rate.".to_owned(),
     ])
 }
 

@@ -1,4 +1,4 @@
-//! Quantity, axis and unit from the name of a column.
+//! Determines quantity, axis and unit from the name of a column.
 
 use crate::quantity::{Of, spelled};
 use turncal::imu::Sensor;
@@ -34,7 +34,7 @@ const OTHERS: [&str; 10] =
 /// A parsed name.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Name {
-    /// Letters and digits of the name in lower case, without axis and unit.
+    /// Letters and digits of the name in lower case, without those of the axis and the unit.
     pub stem: String,
     /// The axis part.
     pub axis: Option<char>,
@@ -158,7 +158,7 @@ impl Name {
         self.unit.is_some_and(is_magnetic) || OTHERS.iter().any(|other| self.stem.contains(other))
     }
 
-    /// How similar the name is to that of a time column; larger is more similar.
+    /// How similar the name is to the usual name of a time column; larger means more similar.
     pub fn is_time(&self) -> u8 {
         let whole = self.whole();
         let has = |parts: &[&str]| parts.iter().any(|part| whole.contains(part));
@@ -191,13 +191,14 @@ impl Name {
         self.unit.is_some_and(|unit| unit.of == Of::Time)
     }
 
-    /// Whether this column contains one part of a time split into two columns: whole seconds or fraction.
+    /// Whether this column contains one part of a time that is split into two columns: the whole seconds or the
+    /// fraction.
     pub fn is_part_of_time(&self, word: &str) -> bool {
         let unit = self.unit.or_else(|| unit(&self.whole()));
         unit.is_some_and(|unit| unit.word == word)
     }
 
-    /// Whether the column distinguishes several instruments.
+    /// Whether the values of the column distinguish several instruments.
     pub fn is_instance(&self) -> bool {
         let names = [
             "i", "id", "instance", "imu", "imuid", "device", "deviceid", "sensorid",

@@ -1,4 +1,4 @@
-//! Selection of the streams or files of the instrument.
+//! Selects the streams or files that contain the data of the instrument.
 
 use super::columns::{self, Columns, by_stem};
 use super::name::Name;
@@ -22,15 +22,15 @@ use turncal_logs::{DataFile, Source, streams};
 pub struct Streams {
     /// Content of the log, one line per stream.
     listed: Vec<String>,
-    /// The gyro stream, and the accelerometer stream if it is a separate one.
+    /// The gyro stream and, if it is separate, the accelerometer stream.
     pub gyro: String,
     pub accel: Option<String>,
-    /// Time columns and units, if there are two streams.
+    /// Time columns and their units, if there are two streams.
     pub time: Option<PerSensor<(String, String)>>,
     /// Column names in the log.
     pub names: Vec<String>,
     remarks: Vec<String>,
-    /// Body axes of the program.
+    /// Body axes used by the program that wrote the log.
     pub axes: Option<&'static str>,
     /// The first damage.
     pub damage: Option<FileError>,
@@ -42,7 +42,7 @@ pub struct Streams {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Written {
     pub accel: Option<String>,
-    /// Whether the gyros are in this file, and the accelerometers in the log.
+    /// Whether the gyros are in this file and the accelerometers are in the log.
     pub is_exchanged: bool,
 }
 
@@ -69,7 +69,7 @@ struct Member {
 }
 
 impl Streams {
-    /// Examines a log; `None` for a text with a single stream.
+    /// Examines a log; returns `None` for a text with a single stream.
     pub fn of_file(
         file: &DataFile,
         wanted: Option<&str>,
@@ -194,7 +194,7 @@ impl Streams {
         }
     }
 
-    /// Writes the selected streams into `[imu]`, below a description of the log's content.
+    /// Writes the selected streams into `[imu]`, below comments that describe the content of the log.
     pub fn describe(&self, imu: &mut ImuFile, remarks: &mut Remarks) {
         if self.written.is_none() {
             for line in &self.listed {
@@ -218,8 +218,7 @@ impl Streams {
             {
                 std::mem::swap(&mut imu.file, other);
             }
-            let why =
-                "accelerometers use their own clock; --with time-offset estimates the difference";
+            let why = "the accelerometers have their own clock; --with time-offset estimates the difference";
             remarks.reason("imu.accel_from", why);
         }
         for remark in &self.remarks {
@@ -228,7 +227,8 @@ impl Streams {
         if let Some(damage) = self.damage.as_ref().filter(|_| self.written.is_none()) {
             let damage = one_line(&damage.to_string());
             imu.salvage = Some(true);
-            let why = format_args!("uncomment this line to use the intact part. {damage}");
+            let why =
+                format_args!("uncomment this line to use the intact part of the file. {damage}");
             remarks.open("imu.salvage", why);
         }
     }

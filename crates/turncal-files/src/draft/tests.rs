@@ -167,7 +167,10 @@ fn counts_get_the_data_sheets_scale_from_gravity_and_its_turns() {
     );
     // Of another sign than the accelerometers, and no data sheet's.
     let text = counts(|count| (-1.1 * count).round());
-    has(&text, &["scale = 918.", "# Gravity rotates opposite"]);
+    has(
+        &text,
+        &["scale = 918.", "# Gravity rotates in the opposite"],
+    );
 }
 
 #[test]
@@ -221,7 +224,7 @@ fn registers_without_names_and_time_are_told_by_their_numbers() {
         &text,
         &[
             "columns = { gyro = [\"4\", \"5\", \"6\"], accel = [\"1\", \"2\", \"3\"] }",
-            "# TODO: no column increases steadily, as times do",
+            "# TODO: no column increases steadily, as a time does",
         ],
     );
 }

@@ -12,9 +12,9 @@ use turncal::number::rounded;
 use turncal::statistics::median;
 use turncal_logs::clock::Uniform;
 
-/// Plausible sample periods, s (5 kHz to 5 Hz): units that differ by 1000 cannot both be plausible.
+/// Plausible sample periods, s (5 kHz to 5 Hz): two units that differ by a factor of 1000 cannot both be plausible.
 pub const PERIODS: std::ops::Range<f64> = 2e-4..0.2;
-/// Time steps match a stated rate if they agree within this factor.
+/// Time steps and a stated rate agree if they differ by less than this factor.
 pub const STATED: f64 = 1.2;
 const DAY: f64 = 86_400.0;
 /// Most rows by which a row that comes late is out of order.
@@ -23,11 +23,11 @@ const FARTHEST: f64 = 100.0;
 /// Certainty of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Certainty {
-    /// Stated in the log and confirmed by motion, determined by motion alone, or stated by the user.
+    /// The value is stated in the log and confirmed by motion, determined by motion alone, or stated by the user.
     Certain,
-    /// Stated in the log or typical, but not confirmed by motion.
+    /// The value is stated in the log or is typical, but motion does not confirm it.
     Guess,
-    /// Neither stated nor confirmed.
+    /// The value is neither stated nor confirmed.
     Unknown,
 }
 
@@ -42,19 +42,19 @@ impl Certainty {
     }
 }
 
-/// Clock detected in the time column.
+/// Clock detected from the time column.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Clock {
-    /// The word or number for `time_unit`.
+    /// The word or number for the field `time_unit`.
     pub unit: String,
     /// Reason and certainty.
     pub why: String,
     pub certainty: Certainty,
     /// Sample period in s, if known.
     pub period: Option<f64>,
-    /// Whether the period is stated in the file rather than derived from times.
+    /// Whether the period is stated in the file and not derived from times.
     pub is_stated: bool,
-    /// Number of time steps longer than the usual one.
+    /// Number of time steps that are longer than the usual step.
     pub gaps: Vec<Gap>,
     /// Rows at which the clock was restarted.
     pub restarts: Vec<usize>,
@@ -62,18 +62,18 @@ pub struct Clock {
     pub repeated: usize,
     /// Mean step of the time column, in its unit.
     pub step: Option<f64>,
-    /// Relative 1σ of the period, if time stamps do not determine the period.
+    /// Relative 1σ of the period, if it is not determined by time stamps.
     pub sigma: f64,
     /// Reason to doubt the clock.
     pub doubt: Option<String>,
 }
 
 impl Clock {
-    /// Examines the time column, and drops it if it is a counter that other packets share.
+    /// Examines the time column, and drops it if it is a counter shared with other packets.
     pub fn find(sheet: &Sheet, columns: &mut Columns) -> Self {
         let stated = sheet.rate.map(f64::recip);
         let Some((column, stamps)) = columns.time.zip(columns.stamps(sheet)) else {
-            return Self::without(stated, "no column increases steadily, as times do");
+            return Self::without(stated, "no column increases steadily, as a time does");
         };
         let steps = Steps::of(&stamps);
         let name = Name::of_column(&sheet.names[column], &sheet.units[column]);
@@ -147,7 +147,7 @@ impl Clock {
         }
     }
 
-    /// A clock whose rate is uncertain by this much, if no time stamps determine the rate or another rate is possible.
+    /// A clock whose rate has this uncertainty, if no time stamps determine the rate or if another rate is possible.
     pub fn within(self, off: f64, has_rival: bool) -> Self {
         let is_doubted = self.sigma > 0.0 || has_rival;
         let sigma = if is_doubted {
@@ -158,7 +158,7 @@ impl Clock {
         Self { sigma, ..self }
     }
 
-    /// A copy of the clock with this row period and its relative 1σ. The copy contains a doubt unless the user stated
+    /// A copy of the clock with this row period and its relative 1σ. The copy contains a doubt, unless the user stated
     /// the rate.
     pub fn given_up(self, period: f64, sigma: f64, is_doubted: bool) -> Self {
         let [rate, former] =
@@ -174,8 +174,8 @@ impl Clock {
             .filter(|_| self.unit != "count")
             .map(|step| rounded(period / step, 7));
         let doubt = format!(
-            "The clock of the log is doubtful: turns fit the unit of the gyros only if a row lasts {times} times as \
-             long as at {former} Hz ({}; {}). turncal used {rate} Hz{}. State --rate, or --gyro-unit if the unit is \
+            "The clock of the log is doubtful: the turns fit the unit of the gyros only if a row lasts {times} times \
+             as long as at {former} Hz ({}; {}). turncal used {rate} Hz{}. State --rate, or --gyro-unit if the unit is \
              wrong.",
             self.unit,
             self.why,
@@ -202,7 +202,7 @@ impl Clock {
         all.into_iter().map(first).collect()
     }
 
-    /// Evidence, statement and remedy if the steps of a time column contradict a stated rate.
+    /// Evidence, stated value and remedy, if the steps of a time column contradict a stated rate.
     pub fn contradiction(&self, rate: f64) -> Option<[String; 3]> {
         let found = self.period?.recip();
         let (hertz, unit, why) = (rounded(found, 6), &self.unit, &self.why);
@@ -232,7 +232,7 @@ impl Clock {
     }
 }
 
-/// A step longer than the usual one.
+/// A time step that is longer than the usual step.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Gap {
     /// The row after the step.

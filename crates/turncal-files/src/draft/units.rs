@@ -20,17 +20,17 @@ use turncal::number::rounded;
 /// Sums of pulses vary less than sums of readings by more than this factor.
 const PULSE_SUMS: f64 = 0.5;
 
-/// Unit of a triad, as far as known.
+/// Unit of a triad, as far as it is known.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Unit {
-    /// Name in `run.toml`, if known.
+    /// Name in `run.toml`, if it is known.
     pub word: Option<&'static str>,
     pub why: String,
     /// Whether the unit is confirmed by motion or stated by the user.
     pub is_shown: bool,
-    /// Whether the rows fit no known unit, or another one than the file states.
+    /// Whether the rows fit no known unit, or fit a unit other than the one stated in the file.
     pub is_unfit: bool,
-    /// Scale of counts, if determined.
+    /// Scale of the counts, if it could be determined.
     pub scale: Option<Scale>,
 }
 
@@ -59,7 +59,9 @@ impl Quantities {
         Self {
             output: Output::Rate,
             output_why: "as in most logs".to_owned(),
-            units: PerSensor::from_fn(|_| Unit::open("there are too few numeric rows to decide")),
+            units: PerSensor::from_fn(|_| {
+                Unit::open("there are too few numeric rows to determine the units")
+            }),
             opposed: false,
         }
     }
@@ -149,7 +151,7 @@ impl Quantities {
         self.output = output;
         self.output_why = match output {
             Output::Pulse => {
-                "the values are integer counts, and the remainder of each is carried into the next row, as in pulse \
+                "the values are whole counts, and the remainder of each row is carried into the next, as in pulse \
                  outputs"
                     .into()
             }
@@ -158,7 +160,7 @@ impl Quantities {
                 format!("the specific force at rest is g times {period} s per row")
             }
             Output::Rate => {
-                "the specific force at rest is g itself, not g times the sample period".into()
+                "the specific force at rest is g, not g times the sample period".into()
             }
         };
     }
@@ -219,9 +221,9 @@ impl Quantities {
             }
             None if is_bare && self.output != Output::Pulse => {
                 return Unit::open(if rows.motion.is_turned {
-                    "there are too few usable turns to estimate it"
+                    "there are too few usable turns to estimate the unit"
                 } else {
-                    "the gravity direction does not change, so it cannot be estimated"
+                    "the gravity direction does not change, so the unit cannot be estimated"
                 });
             }
             _ => {}
@@ -247,7 +249,7 @@ impl Quantities {
         }
     }
 
-    /// The first stated unit that motion contradicts, if motion confirms another: evidence, statement, remedy.
+    /// The first stated unit that the motion contradicts while it confirms another unit: evidence, stated unit, remedy.
     pub fn contradiction(
         &self,
         stated: &Stated,
@@ -308,8 +310,8 @@ impl Quantities {
         self.units.get(sensor).word == Some("count")
     }
 
-    /// For rates: the sample period for which the turns fit the unit of the gyros, whether this unit is stated, named
-    /// in the file or detected.
+    /// For rates: the sample period for which the turns fit the unit of the gyros, and whether this unit is stated,
+    /// named in the file or detected.
     pub fn turned_period(
         &self,
         stated: &Stated,
@@ -367,7 +369,9 @@ fn why_count(rows: &TriadRows, unfit: &str) -> String {
         _ if rows.whole => "whole numbers".to_owned(),
         Some(unit) => {
             let unit = unit.word;
-            format!("{unit} is not a built-in unit, so it is a count with a scale")
+            format!(
+                "{unit} is not a built-in unit, so turncal treats it as a count with this scale"
+            )
         }
         None => unfit.to_owned(),
     }

@@ -1,4 +1,4 @@
-//! Parameters for PX4, ArduPilot, Betaflight and INAV: offsets, and accelerometer scales.
+//! Parameters for PX4, ArduPilot, Betaflight and INAV: offsets, and scales of the accelerometers.
 //!
 //! PX4 and ArduPilot compute `(n − offset) ⊙ scale` for accelerometers and `n − offset` for gyros, in sensor axes, and
 //! then rotate to body axes (`SENS_BOARD_ROT`, `AHRS_ORIENTATION`). INAV and Betaflight do the same in whole counts.
@@ -18,7 +18,7 @@ use turncal::imu::{AXES, PerSensor, Sensor};
 use turncal::units::{DEGREE, STANDARD_GRAVITY};
 
 const UPPER: [&str; 3] = ["X", "Y", "Z"];
-const UNCORRECTED: &str = "gyro scale factors and all misalignments";
+const UNCORRECTED: &str = "gyro scale factors, and all misalignments";
 /// Reference temperature of ArduPilot, °C, and the factor of its coefficients.
 const ARDUPILOT_REFERENCE: f64 = 35.0;
 const ARDUPILOT_FACTOR: f64 = 1e6;
@@ -68,12 +68,12 @@ pub fn px4(values: &Values) -> Exported {
     // PX4 compares the identities with those of its drivers, which no log of samples holds.
     let thermal = values.record.temperature.iter();
     let ids = match &values.record.temperature {
-        None => "CAL_GYRO0_ID and CAL_ACC0_ID: set them to the device_id",
+        None => "CAL_GYRO0_ID and CAL_ACC0_ID: set both to the device_id",
         Some(_) => "CAL_GYRO0_ID = TC_G0_ID and CAL_ACC0_ID = TC_A0_ID: set them to the device_id",
     };
     let ids = format!(
-        "{ids} that `listener sensor_gyro` and `listener sensor_accel` show; PX4 ignores the other parameters without \
-         them"
+        "{ids} that `listener sensor_gyro` and `listener sensor_accel` show; without it, PX4 ignores the other \
+         parameters"
     );
     for (thermal, sensor) in thermal.flat_map(|thermal| Sensor::ALL.map(|sensor| (thermal, sensor)))
     {
@@ -103,7 +103,7 @@ pub fn ardupilot(values: &Values) -> Exported {
     let program = single(values);
     let notes = [
         UNCORRECTED,
-        "instance number: the second instance uses INS_ACC2OFFS_X and so on",
+        "instance number: for the second instance, use INS_ACC2OFFS_X and so on",
         "permanent gyro offsets: ArduPilot re-estimates them at every start unless INS_GYR_CAL is 0",
     ];
     let lines = |parameters: Parameters| -> String {
@@ -144,7 +144,8 @@ fn counts(v: &Vector3<f64>, per_unit: f64) -> Vector3<f64> {
 
 fn of_counts(what: &str, counts: f64, unit: &str) -> String {
     format!(
-        "counts are for {what} with {counts:.0} counts per {unit}; for n counts per {unit}, multiply by n / {counts:.0}"
+        "the counts are for {what} with {counts:.0} counts per {unit}; if yours has n counts per {unit}, multiply the \
+         values by n / {counts:.0}"
     )
 }
 
@@ -157,13 +158,16 @@ pub fn betaflight(values: &Values) -> Exported {
         accel: Affine::offset(zero / per_unit),
     };
     let notes = ["all gyro parameters, because Betaflight zeroes the gyros at every start"];
-    let reads = ("#", "commands for its command line, from rad/s and m/s^2");
+    let reads = (
+        "#",
+        "commands for the Betaflight command line, computed from rad/s and m/s^2",
+    );
     let [x, y, z] = [zero.x, zero.y, zero.z].map(|count| count as i64);
     Remarks::of_program(values, reads, &program, &notes)
         .defines([
             of_counts("an accelerometer", COUNTS_PER_G, "g"),
-            "for a log recorded with acc_calibration = 0,0,0,0, because Betaflight subtracts this value before \
-             logging".to_owned(),
+            "these values are for a log recorded with acc_calibration = 0,0,0,0, because Betaflight subtracts \
+             acc_calibration before logging".to_owned(),
         ])
         .above(&format!("set acc_calibration = {x},{y},{z},1\nsave\n"))
 }
@@ -190,13 +194,16 @@ pub fn inav(values: &Values) -> Exported {
         ("gyro_zero", &gyro_zero),
     ];
     let text = all.map(|(name, values)| set(name, values)).concat();
-    let reads = ("#", "commands for its command line, from rad/s and m/s^2");
+    let reads = (
+        "#",
+        "commands for the Betaflight command line, computed from rad/s and m/s^2",
+    );
     Remarks::of_program(values, reads, &program, &[UNCORRECTED])
         .defines([
             of_counts("an accelerometer", COUNTS_PER_G, "g"),
             of_counts("gyros", COUNTS_PER_RAD_S, "rad/s"),
-            "for a log recorded with acczero and gyro_zero = 0, accgain = 4096 and init_gyro_cal = OFF: INAV applies \
-             these values before logging"
+            "these values are for a log recorded with acczero and gyro_zero = 0, accgain = 4096 and init_gyro_cal = \
+             OFF, because INAV applies its own values before logging"
                 .to_owned(),
         ])
         .above(&(text + "set init_gyro_cal = OFF\nsave\n"))

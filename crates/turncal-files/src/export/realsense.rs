@@ -27,8 +27,8 @@ fn table([major, minor]: [u8; 2], kind: u16, content: &[u8]) -> Vec<u8> {
 pub fn write(values: &Values) -> Exported {
     let program = PerSensor::from_fn(|sensor| Affine::complete(values.triads.get(sensor)));
     let notes = [
-        "the rotation and translation to the depth sensor, which keep their design values",
-        "the serial number after the table, which is left empty",
+        "the rotation and translation relative to the depth sensor, which keep their design values",
+        "the serial number that follows the table, which is left empty",
     ];
     let mut imu = vec![0xff; 37 * 4 + 96];
     // Intrinsics are set, extrinsics are not.

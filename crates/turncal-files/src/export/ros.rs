@@ -12,8 +12,8 @@ use turncal::imu::{PerSensor, Sensor};
 /// Covariance matrices about x, y, z in row-major order, with the variance per sample, density² × rate.
 pub fn covariance(values: &Values) -> Exported {
     let notes = [
-        "scale, misalignment and bias; publish the output of `turncal apply`, which has these errors removed",
-        "bias drift, which is not white; measure it with `turncal allan`",
+        "scale, misalignment and bias; publish the output of `turncal apply`, from which these errors are removed",
+        "bias drift, because it is not white; measure it with `turncal allan`",
     ];
     let line = |(key, sensor)| match values.triads.get(sensor).density().zip(values.rate) {
         Some((density, rate)) => {
@@ -41,7 +41,8 @@ pub fn imu_calib(values: &Values) -> Exported {
         accel: Affine::complete(&values.triads.accel),
     };
     let notes = [
-        "gyro biases: imu_calib averages the gyros at its start, which includes Earth rate of up to 15.041 deg/h",
+        "gyro biases: imu_calib averages the gyros at its start, and the average includes Earth rate of up to 15.041 \
+         deg/h",
     ];
     let reads = ("#", "imu_calib reads rad/s and m/s^2");
     let matrix = list(&program.accel.matrix.transpose());

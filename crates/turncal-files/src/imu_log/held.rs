@@ -2,12 +2,12 @@
 
 use turncal_logs::clock::REACH;
 
-/// Limits for the number of rows in memory.
+/// Limits for the number of rows kept in memory.
 #[derive(Debug, Clone, Copy)]
 pub struct Sizes {
     /// Longer logs are packed; a log of up to this length takes at most 50 MB.
     pub long: usize,
-    /// Number of rows searched for faults at once.
+    /// Number of rows that are searched for faults at once.
     pub part: usize,
 }
 
@@ -24,7 +24,7 @@ impl Default for Sizes {
 #[derive(Default)]
 pub struct Held {
     pub columns: [Vec<f64>; 6],
-    /// For each duplicate, the number of rows before it and its line.
+    /// For each duplicate row, the number of rows before it and its line in the file.
     pub duplicates: Vec<(usize, u64)>,
 }
 

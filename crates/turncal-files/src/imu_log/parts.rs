@@ -19,7 +19,7 @@ use turncal_logs::clock::{Line, REACH, Stamps, Uniform, Wander};
 /// Additional rows searched on either side of a part; more than the reach of a bridge and its evidence.
 const BESIDE: usize = 1 << 13;
 
-/// Samples of a log so far.
+/// The samples of a log that have been read so far.
 pub struct Parts<'a> {
     log: &'a ImuLog<'a>,
     layout: Layout,
@@ -42,8 +42,8 @@ pub struct Parts<'a> {
 }
 
 impl<'a> Parts<'a> {
-    /// Starts with the first rows of a log, or with all of them. For a log in parts, the drift of the samples may be
-    /// known.
+    /// Starts with the first rows of a log, or with all its rows. For a log that is read in parts, the drift of the
+    /// samples may already be known.
     pub fn new(
         log: &'a ImuLog<'a>,
         layout: Layout,
@@ -92,12 +92,12 @@ impl<'a> Parts<'a> {
         self.size.map(|size| self.taken + size + 2 * BESIDE)
     }
 
-    /// Whether enough rows are in memory for some of them to be processed.
+    /// Whether enough rows are in memory to process some of them.
     pub fn is_full(&self, held: &Held) -> bool {
         self.end().is_some_and(|end| held.len() >= end + REACH)
     }
 
-    /// Processes rows in memory (all at the end of the file) and releases those no longer needed.
+    /// Processes rows in memory (at the end of the file, all rows), and releases the rows that are no longer needed.
     pub fn take(
         &mut self,
         held: &mut Held,
@@ -259,7 +259,7 @@ impl<'a> Parts<'a> {
         self.taken -= rows;
     }
 
-    /// Whether rows were packed while reading.
+    /// Whether rows were packed while the log was read.
     pub fn are_packed(&self) -> bool {
         self.size.is_some()
     }

@@ -1,4 +1,4 @@
-//! Sources of rows and their clocks, as described in `run.toml`.
+//! Sources of rows and their clocks, described in `run.toml`.
 
 use crate::schema::instrument::Fields;
 use crate::schema::{TimeColumn, TimeUnitField};
@@ -55,7 +55,7 @@ impl<'a> Fields<'a> {
         };
         if nanoseconds.is_some() && unit.is_some_and(|unit| unit != seconds) {
             let path = format!("{table}.time_unit");
-            let advice = "Set it to `s`, or remove it.";
+            let advice = "Set time_unit to `s`, or remove it.";
             return Err(self.document.wrong(&path, "`s`", advice));
         }
         Ok(Clock {
@@ -91,8 +91,7 @@ impl<'a> Fields<'a> {
             clock.unit = of_gyro.unit;
         }
         if clock.column.is_none() {
-            let meaning =
-                "the time column of the accelerometers, because separate streams both need one";
+            let meaning = "the time column of the accelerometers, because two separate streams both need a time column";
             return Err(self.document.missing("imu.accel_from.time", meaning));
         }
         Ok(Some((source, clock)))

@@ -1,4 +1,4 @@
-//! A [`Run`] as a run directory.
+//! Writes a [`Run`] as a run directory.
 
 use super::calibration_json;
 use std::collections::BTreeMap;
@@ -305,7 +305,10 @@ fn turntable_file(run: &Run) -> TurntableFile {
 
 fn remarks(run: &Run) -> Remarks {
     let mut remarks = Remarks::default();
-    remarks.before("imu", "instrument samples along body right-front-up");
+    remarks.before(
+        "imu",
+        "samples of the instrument along the body axes right, front, up",
+    );
     remarks.before(
         "imu.prior.gyro",
         "known before calibration: N = scale * installation * u + bias, with N in the file's quantity per second",

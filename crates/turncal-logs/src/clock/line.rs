@@ -66,8 +66,8 @@ impl Uniform {
         }
         (self.jitter_max > self.period).then(|| {
             format!(
-                "Time stamps jitter by up to {}, more than the sample period of {sample}. turncal fitted a uniform \
-                    clock to them.",
+                "The time stamps jitter by up to {}, more than the sample period of {sample}. turncal fitted a \
+                 uniform clock to the time stamps.",
                 ms(self.jitter_max),
             )
         })
@@ -356,7 +356,7 @@ fn gap(file: &Path, before: f64, (time, line): (f64, u64)) -> FileError {
         Place::Line(line),
         format_args!("a gap in time from {before} s to {time} s"),
         "fewer missing rows than recorded rows",
-        "Correct the clock, or split the recording there.",
+        "Correct the clock, or split the recording at this gap.",
     )
 }
 
@@ -365,7 +365,7 @@ fn not_forward(file: &Path, line: u64) -> FileError {
         file,
         Place::Line(line),
         "times that stop increasing here",
-        "times that increase with every row",
+        "times that increase from row to row",
         "Correct the time column, remove these rows, or name another time column in run.toml.",
     )
 }

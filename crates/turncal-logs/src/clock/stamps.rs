@@ -133,7 +133,7 @@ impl Stamps {
             return Err(csv.error_here(
                 "the same time as in the previous row, but other values",
                 "a later time",
-                "Remove the wrong one of the two rows, or log the time with more digits.",
+                "Remove the wrong row of the two, or log the time with more digits.",
             ));
         }
         if self.is_set_to(place, csv)? {
@@ -336,7 +336,7 @@ impl Stamps {
         self.cut(step);
         self.set.push(format!(
             "line {}: the time jumps from {} to {} because the clock was set, so the length of the gap is unknown. \
-                turncal treats the rest as a separate stretch and shifts its times by {} s.",
+             turncal treats the following rows as a separate stretch and shifts their times by {} s.",
             csv.line(),
             self.words(before),
             self.words(before + step),
@@ -393,8 +393,8 @@ impl Stamps {
         let ends = self.pauses.first().zip(self.pauses.last());
         notes.extend(ends.map(|(first, last)| {
             format!(
-                "{file}: recording paused {}, first before line {}, for longer in total than it ran. turncal counts \
-                 {BREAK} s of each pause as missing rows and ignores the other {} s.",
+                "{file}: the recording paused {}, first before line {}, and the pauses are longer in total than the \
+                 recording. turncal counts {BREAK} s of each pause as missing rows and ignores the other {} s.",
                 counted(self.pauses.len(), "time"),
                 first.line,
                 nanoseconds(last.left_out)
@@ -422,8 +422,8 @@ impl Stamps {
             )),
             TimeUnit::Count => (missing > 0).then(|| {
                 format!(
-                    "Rows are missing, and the counter wraps every {} samples ({} s). Each gap may be longer by one or \
-                     more of these periods, and all later times would then be too early by the same amount. Use a time \
+                    "Rows are missing, and the counter wraps every {} samples ({} s). Each gap may be longer by one \
+                     or more of these periods; all later times would then be too early by the same amount. Use a time \
                      that does not wrap, or split the recording at the gaps.",
                     (size / self.period()).round(),
                     nanoseconds(size)

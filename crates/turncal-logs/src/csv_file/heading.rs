@@ -419,7 +419,7 @@ impl Looks {
             None if !is_near => numbered(first),
             None if has_numbers => Named {
                 cut: Some(format!(
-                    "Line {} has {} fields, but the rows below it have {columns}. turncal left this line out.",
+                    "Line {} has {} fields, but the rows below it have {columns}. turncal omitted this line.",
                     look.number,
                     fields.len()
                 )),

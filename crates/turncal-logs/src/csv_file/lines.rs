@@ -61,7 +61,7 @@ impl From<io::Error> for Stop {
     }
 }
 
-/// The lines of a file, with a look-ahead at the first ones.
+/// The lines of a file; the first lines can be examined before they are read.
 pub struct Lines {
     source: Box<dyn BufRead>,
     /// Line ending.

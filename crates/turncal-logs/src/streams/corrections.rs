@@ -134,7 +134,7 @@ fn words(program: &str, sensor: Sensor, applied: Option<&Applied>) -> String {
     match applied {
         Some(of) if of.is_more => format!(
             "{program} corrected its {triad} by {} and also rotated the axes or compensated for temperature. turncal \
-                cannot undo this, so the calibration applies to the corrected data.",
+             cannot undo these changes, so the calibration applies to the corrected data.",
             of.name
         ),
         Some(of) => format!(
@@ -142,7 +142,7 @@ fn words(program: &str, sensor: Sensor, applied: Option<&Applied>) -> String {
             of.name
         ),
         None => format!(
-            "{program} corrects its {triad}; the log does not state the correction, so turncal used the values \
+            "{program} corrects its {triad}; the log does not state the corrections, so turncal used the values \
              unchanged."
         ),
     }

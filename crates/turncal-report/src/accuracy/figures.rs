@@ -27,13 +27,14 @@ pub fn figures(accuracy: &Accuracy) -> [Plot; 2] {
     );
     let gain = ratios(
         accuracy,
-        "RMS error of closed form / RMS error of EKF",
+        "RMS error of the closed form / RMS error of the EKF",
         &gains,
     );
     [
         Plot::new("ratio.svg", "Error over bound", (1, 400), [bound]).caption(
             "RMS error of the EKF divided by the Cramér–Rao bound, for each parameter group and for the position \
-             after 40 h; bars: 99 % interval. A bar that crosses the line at 1 is consistent with an optimal filter.",
+             after 40 h; the bars show 99 % intervals. If a bar crosses the line at 1, the group is consistent with \
+             an optimal filter.",
         ),
         Plot::new("gain.svg", "Gain over the closed form", (1, 460), [gain]).caption(format!(
             "RMS error of the closed form divided by the RMS error of the EKF in {filter}, with 99 % intervals. Above \

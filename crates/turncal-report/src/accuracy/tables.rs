@@ -52,10 +52,10 @@ pub fn bound(accuracy: &Accuracy) -> Table {
     let cells = |of: &Compared| against_bound(of.figures, of.unit_value);
     Table::new("EKF against the Cramér–Rao bound", columns(AGAINST_BOUND))
         .sections(sections(accuracy, cells))
-        .note("RMS over all runs and all parameters of a group. σ: computed by the filter.")
-        .note("Position: horizontal error after 40 h from perfect alignment. Flight: the same along the trajectory \
-               flight.")
-        .note("Bound: Bayesian Cramér–Rao bound, computed in a pass linearised at the truth. Interval: bootstrap over \
+        .note("RMS over all runs and all parameters of a group. RMS σ: the σ computed by the filter.")
+        .note("Position: horizontal error after 40 h of navigation from perfect alignment. Flight: the same quantity \
+        along the trajectory flight.")
+        .note("RMS bound: Bayesian Cramér–Rao bound, computed in a pass that is linearised at the truth. Interval: bootstrap over \
                runs.")
 }
 

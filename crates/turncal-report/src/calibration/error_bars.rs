@@ -18,11 +18,12 @@ impl Report<'_> {
         });
         let panels =
             Group::all().filter_map(|group| self.of_group(group, estimate, prior.as_ref()));
-        let mut caption = "Each parameter with an error bar of ±2σ (hidden by the dot if the parameter is well \
-                           determined); scale factors as deviation from nominal. Bands: prior mean ±1σ."
-            .to_owned();
+        let mut caption =
+            "Each parameter with an error bar of ±2σ (hidden by the dot if the parameter is well \
+        determined); scale factors are shown as deviations from nominal. Bands: prior mean ±1σ."
+                .to_owned();
         if self.specification.is_some() {
-            caption += " Dashed: limits of the specification. The bar of a prior may extend beyond the axes.";
+            caption += " Dashed: limits of the specification. The error bar of a prior may extend beyond the axes.";
         }
         let heading = "Values with their uncertainty";
         Plot::new("values.svg", heading, (3, 270), panels).caption(caption)

@@ -184,7 +184,8 @@ pub fn run(report: &Report) -> Facts {
     }
     if let Some(table) = report.table() {
         let readings = format!(
-            "{} readings; position {} ″ (1σ, independent at each position), reading {} ″ (1σ, white)",
+            "{} readings; position error {} ″ (1σ, independent from position to position), reading error {} ″ (1σ, \
+             white)",
             count(table.time.len()),
             sigma(run.table.position_sigma / ARCSEC),
             sigma(run.table.reading_sigma / ARCSEC)
@@ -213,8 +214,8 @@ fn noise(sensor: Sensor, noise: &Noise) -> String {
 impl Report<'_> {
     /// The model, the method and the frame.
     pub fn model(&self) -> Facts {
-        let symbols = "N: output per second divided by its nominal scale; u: angular rate or specific force along \
-            the body axes; K: scale factors, shown as deviation from nominal; E: off-diagonal entries of C; D: bias";
+        let symbols = "N: output per second divided by its nominal scale; u: angular rate or specific force along the \
+        body axes; K: scale factors, shown as deviations from nominal; E: off-diagonal entries of C; D: bias";
         let equation = "N = K C u + D; u = (K C)⁻¹ (N − D)";
         let rows = [("equation", equation), ("symbols", symbols)];
         let mut facts = Facts::new("Model and method", rows);

@@ -48,9 +48,9 @@ impl Report<'_> {
         );
         (curves.gyro[0].tau.len() > 2).then(|| {
             plot.caption(
-                "Overlapping Allan deviation of each axis against cluster time, averaged over the dwells. Black: noise \
-                 estimated by the calibration. Dashed: noise stated for the instrument. Dots far above a line indicate \
-                 vibration or quantisation at short times, and a varying bias at long times.",
+                "Overlapping Allan deviation of each axis against cluster time, averaged over the dwells. Black: \
+                 noise that the calibration estimated. Dashed: noise stated for the instrument. Dots far above the \
+                 lines indicate vibration or quantisation at short times, and a varying bias at long times.",
             )
         })
     }

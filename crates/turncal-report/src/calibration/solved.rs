@@ -19,7 +19,7 @@ pub struct Truth {
     pub terms: BTreeMap<String, TermRecord>,
 }
 
-/// The report on the calibration of a problem with this name, and on its consequences for navigation.
+/// The report on the calibration of a problem with this name, and on its effect on navigation.
 pub fn document(
     (problem, name): (&Problem, &str),
     (checked, consequences): (&CheckedCalibration, &Consequences),
@@ -69,7 +69,7 @@ pub fn within(
     report.document()
 }
 
-/// Short description of the data used by a closed form.
+/// Short description of the data that a closed form used.
 pub fn note(closed_form: &ClosedForm) -> String {
     let PerSensor { gyro, accel } = closed_form.positions;
     let turns = closed_form.turns;
@@ -79,7 +79,7 @@ pub fn note(closed_form: &ClosedForm) -> String {
         }
         Reference::Labels => format!("{accel} labelled positions and {turns} labelled turns"),
         Reference::Gravity => {
-            format!("gravity in {accel} dwells and its direction change over {turns} turns")
+            format!("gravity in {accel} dwells and the change of its direction over {turns} turns")
         }
         Reference::GravityAlone => format!("the magnitude of gravity in {accel} dwells"),
     };

@@ -1,4 +1,4 @@
-//! The tables, the same for terminal and page.
+//! The tables, which are the same on the terminal and on the page.
 
 use super::super::terms;
 use super::super::terms::improvement;
@@ -58,7 +58,7 @@ impl Report<'_> {
     }
 }
 
-/// The least observed directions: all that are not observed, and some that are.
+/// The least observed directions: all directions that are not observed, and some that are observed.
 pub fn weakest(outcome: &Outcome) -> Table {
     let observability = &outcome.observability;
     let shown = observability.unobserved().count() + WEAKEST;
@@ -66,9 +66,9 @@ pub fn weakest(outcome: &Outcome) -> Table {
     Table::new("Least observed directions", ["direction", "prior : σ"])
         .section(rows.map(|of| vec![of.words.clone(), improvement(1.0, of.remaining)]))
         .note(
-            "Combinations of parameters, each in units of its prior σ, that the data determine independently of each \
-             other. “With” joins parameters whose errors have the same sign, “against” parameters whose errors have \
-             opposite signs.",
+            "Combinations of parameters, each in units of its prior σ, that the data determine \
+             independently. “With” joins parameters whose errors have the same sign; “against” joins parameters whose \
+             errors have opposite signs.",
         )
 }
 
@@ -105,8 +105,8 @@ pub fn consistency(outcome: &Outcome) -> Table {
         ]
     });
     Table::new("Consistency", columns("observation | NIS per scalar | 95 % interval | lag-one correlation | scalars")).section(rows).note(
-        "If NIS is within its interval and the correlation is near zero, the innovations are as large and as white \
-         as the filter predicts.",
+        "If the NIS is within its interval and the lag-one correlation is near zero, the innovations are as large and \
+         as white as the filter predicts.",
     )
 }
 
@@ -126,7 +126,7 @@ pub fn cross_validation(quality: &Quality) -> Option<String> {
     (!parts.is_empty()).then(|| format!("{} ({} dwells)", parts.join("; "), held_out.gravity.count))
 }
 
-/// Each residual over the whole recording and over the excluded dwells; empty without data.
+/// Each residual, over the whole recording and over the excluded dwells; empty if there are no data.
 pub fn residuals(quality: &Quality, table: Option<&TableLog>) -> Table {
     let turns = match table {
         Some(_) => "attitude after a turn, gyros minus table",
@@ -134,7 +134,7 @@ pub fn residuals(quality: &Quality, table: Option<&TableLog>) -> Table {
     };
     let named = [
         ("|f| minus g in dwells", FORCE),
-        ("up after a turn, gyros minus accels", ANGLE),
+        ("vertical after a turn, gyros minus accels", ANGLE),
         (turns, ANGLE),
     ];
     let of = |m: &Measures| [m.gravity, m.direction, m.turns];
@@ -162,7 +162,8 @@ pub fn residuals(quality: &Quality, table: Option<&TableLog>) -> Table {
     let table = Table::new("Residuals at rest and after turns", columns).section(rows);
     if quality.held_out.is_some() {
         table.note(
-            "Cross-validation: residuals in dwells excluded from the fit, and over the turns that end in them.",
+            "Cross-validation: residuals in dwells excluded from the fit, and over the turns that end in these \
+             dwells.",
         )
     } else {
         table

@@ -32,8 +32,8 @@ impl Change {
         self.left.value - self.found.value
     }
 
-    /// Expanded uncertainty of the difference, as if both calibrations were from independent data; `None` if the
-    /// earlier calibration states none.
+    /// Expanded uncertainty of the difference, assuming that both calibrations are from independent data; `None` if the
+    /// earlier calibration states no uncertainty.
     pub fn expanded(&self) -> Option<f64> {
         let (found, left) = (self.found.expanded, self.left.expanded);
         (found > 0.0).then(|| found.hypot(left))

@@ -195,7 +195,7 @@ fn administrative(certificate: &Certificate) -> Markup {
 
 fn statement(limit: &Decided, rule: &str) -> Markup {
     let text = format!(
-        "{} from nominal in SI units, limit ±{}; decision rule: {rule}; probability that the decision is wrong: {:.1e}",
+        "{} from nominal in SI units, limit ±{}; decision rule: {rule}; probability of a wrong decision: {:.1e}",
         number(limit.off),
         number(limit.limit.within),
         limit.risk,
@@ -294,7 +294,7 @@ fn description(certificate: &Certificate) -> String {
 /// Parameters as found, with their own uncertainties; parameters as left are the results in the same body frame.
 fn found(as_found: &AsFound) -> Markup {
     let about = format!(
-        "Valid when the item was received, from {}; general installation form, body frame: {}.",
+        "Valid when the item was received; from {}; general installation form, body frame: {}.",
         as_found.earlier,
         as_found.body_frame.words()
     );

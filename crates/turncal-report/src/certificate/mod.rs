@@ -82,7 +82,7 @@ impl Certificate {
     /// The certificate of a calibration; the SHA-256 is that of the calibration file.
     ///
     /// # Errors
-    /// [`CertificateError`] if the calibration must not be used, or a field is missing.
+    /// Returns [`CertificateError`] if the calibration must not be used, or a field is missing.
     pub fn new(
         calibration: Calibration,
         sha256: String,
@@ -138,8 +138,8 @@ impl Certificate {
     /// Remarks for the customer: scope of the certificate, remarks of the laboratory, and findings of the evaluation.
     pub fn remarks(&self) -> Vec<String> {
         let general = [
-            "The results relate only to the item named above, in its stated condition and under the stated measurement \
-             conditions.",
+            "The results relate only to the item named above, in the stated condition of the item and under the \
+             stated measurement conditions.",
             "This certificate may not be reproduced except in full without approval of the laboratory.",
         ];
         let general = general.into_iter().map(str::to_owned);

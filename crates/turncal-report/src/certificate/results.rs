@@ -8,8 +8,8 @@ use turncal::imu::{Nominal, ParameterKind, PerSensor, Sensor, TERM_PARAMETERS, T
 /// Coverage factor for 95.45 % if the degrees of freedom were not evaluated.
 const COVERAGE_FACTOR: f64 = 2.0;
 
-/// Coverage factor and degrees of freedom of a parameter, which are the same in every table. They come from the budget
-/// of the calibration or, without a budget, from a normal distribution.
+/// Coverage factor and degrees of freedom of a parameter, which are the same in every table. Coverage factor and
+/// degrees of freedom come from the budget of the calibration or, without a budget, from a normal distribution.
 pub fn coverage(calibration: &Calibration, name: &str) -> (f64, Option<f64>) {
     let place = calibration.parameters.iter().position(|of| of == name);
     let of_budget = calibration
@@ -133,7 +133,8 @@ pub fn results(
     Some((results.collect::<Option<_>>()?, covariance))
 }
 
-/// Every estimated parameter of the instrument's error terms; those of the table are not results for the instrument.
+/// Every estimated parameter of the instrument's error terms; the errors of the table are not included, because they
+/// are not results for the instrument.
 pub fn terms(calibration: &Calibration) -> Vec<Measured> {
     let measured = |k: usize| {
         let name = Term::parameter_name(k)?;
@@ -151,7 +152,7 @@ pub fn terms(calibration: &Calibration) -> Vec<Measured> {
     (0..TERM_PARAMETERS).filter_map(measured).collect()
 }
 
-/// States the temperatures at which the results are valid, and where to find the temperature coefficients.
+/// States the temperatures at which the results are valid, and where the temperature coefficients can be found.
 pub fn temperature_words(of: &ThermalRecord, number: impl Fn(f64) -> String) -> String {
     let triad = |(name, sensor): (&str, Sensor)| {
         let range = of.range.get(sensor);

@@ -55,7 +55,7 @@ pub fn log(run: &Run, survey: &Survey) -> String {
     );
     if let Some(log) = &run.recording.imu.log {
         text += &format!(
-            " {} rows; time stamps deviate from a uniform clock by {} µs RMS, {} µs at most.",
+            " {} rows; the time stamps deviate from a uniform clock by {} µs RMS, and by {} µs at most.",
             count(log.rows),
             value(log.jitter_rms / MICROSECOND, 1.0),
             value(log.jitter_max / MICROSECOND, 1.0)
@@ -94,7 +94,8 @@ fn warming(run: &Run) -> String {
         if span < SOAKED {
             "soaked within 1 K"
         } else {
-            "the instrument is not soaked, so parameters may change during the recording (see calibrate --temperature)"
+            "the instrument has not reached a constant temperature, so parameters may change during the recording \
+             (see calibrate --temperature)"
         }
     )
 }
@@ -151,8 +152,8 @@ fn of_motion(survey: &Survey) -> Vec<String> {
             "Missing positions"
         };
         findings.push(format!(
-            "{positions}: {}. Upward directions {}° or more apart: {}. Without a table, the nine accelerometer parameters \
-             need all six positions or {DIRECTIONS} such directions.",
+            "{positions}: {}. There are {} upward directions that are {}° or more apart. Without a table, the nine \
+             accelerometer parameters need all six positions, or {DIRECTIONS} different upward directions.",
             missing.join(", "),
             degrees(APART),
             survey.directions
@@ -178,7 +179,7 @@ fn of_methods(survey: &Survey) -> Vec<String> {
         Vec::new()
     } else {
         vec![format!(
-            "With every method, the σ of {} would stay above half of the prior. Add positions and turns.",
+            "With every method, the σ of {} would remain above half of the prior σ. Add positions and turns.",
             always.join(", ")
         )]
     }

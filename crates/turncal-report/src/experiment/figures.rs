@@ -22,8 +22,9 @@ pub fn distribution(experiment: &Experiment) -> Plot {
     };
     let panels = experiment.navigations.iter().map(panel);
     Plot::new("distribution.svg", "Position error at the end", (1, 330), panels).caption(
-        "Horizontal position error at the end, on the same logarithmic axis for all methods. Small dots: instruments; \
-         large dot with its value: median; line: the middle half; dashed: median error due to instrument noise alone.",
+        "Horizontal position error at the end of navigation, on a logarithmic scale that is the same for all \
+         methods. Small dots: instruments; large dot with its value: median; thick line: the middle half; dashed: \
+         median error caused by instrument noise alone.",
     )
 }
 

@@ -9,7 +9,7 @@ pub fn values(lot: &Lot) -> Plot {
     let panels = together(lot).into_iter().map(|of| panel(lot, &of));
     let what = match (&lot.specification, &lot.truth) {
         (Some(_), _) => {
-            "The calibrations are in the given order. Dashed: limits, in black if they are common to all axes"
+            "The calibrations are in the given order. Dashed: limits (black if a limit is common to all axes)"
         }
         (None, Some(_)) => "Differences of the calibrations from the truth",
         (None, None) => "Differences of the calibrations from their mean",

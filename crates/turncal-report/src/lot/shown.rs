@@ -43,7 +43,7 @@ pub fn unit_key(quantity: Quantity) -> &'static str {
     unit(quantity).1
 }
 
-/// Value and σ in the unit of the quantity; a scale factor is given as its deviation from nominal.
+/// Value and σ in the unit of the quantity; for a scale factor, the value is the deviation from nominal.
 pub fn shown(quantity: Quantity, of: Sample) -> (f64, f64) {
     let value = match quantity {
         Quantity::Parameter(index) => Group::of(index).shown(of.value),

@@ -27,7 +27,7 @@ pub struct Fonts {
 }
 
 impl Fonts {
-    /// `None` if the fonts cannot be read, which the tests exclude.
+    /// Returns `None` if the fonts cannot be read; the tests ensure that this does not happen.
     pub fn new() -> Option<Self> {
         Some(Self {
             regular: Typeface::new(REGULAR)?,

@@ -30,12 +30,12 @@ pub struct Axis {
     pub ends: Option<(f64, f64)>,
     /// Values to include in addition to the data.
     pub including: Vec<f64>,
-    /// Margins below and above the data: fractions of their span; factors for a logarithmic axis; numbers of positions
-    /// for an axis of names.
+    /// Margins below and above the data, given as fractions of the span of the data, as factors (logarithmic axis), or
+    /// as numbers of positions (axis of names).
     pub room: (f64, f64),
     /// Names at the positions 0, 1, 2 …, shown instead of numbers.
     pub places: Vec<String>,
-    /// Whether the axis is not drawn, as in a map.
+    /// Whether the axis is hidden, as in a map.
     pub is_bare: bool,
 }
 
@@ -58,7 +58,7 @@ impl Axis {
         }
     }
 
-    /// An axis with these ends that is not drawn.
+    /// An axis with these ends that is hidden.
     pub fn bare(low: f64, high: f64) -> Self {
         Self {
             is_bare: true,

@@ -121,8 +121,8 @@ impl Panel {
     }
 }
 
-/// Offset of the n-th of several items from the centre of their common position; together, the items occupy this
-/// fraction of the position.
+/// Offset of the n-th of several items from the centre of their common position; together, the items use this fraction
+/// of the width of the position.
 pub fn beside(n: usize, count: usize, part: f64) -> f64 {
     part * ((n as f64 + 0.5) / count.max(1) as f64 - 0.5)
 }

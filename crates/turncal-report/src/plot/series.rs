@@ -128,7 +128,7 @@ impl Series {
         }
     }
 
-    /// Points joined in order; dense data are reduced to the lowest and highest.
+    /// Points joined in order; if the data are dense, only the lowest and highest points of each interval are kept.
     pub fn line(points: impl IntoIterator<Item = Point>) -> Self {
         Self::new(Shape::Line(thinned(points, MOST)))
     }
@@ -220,8 +220,8 @@ impl Series {
 /// Maximum number of points of a line; no panel is wider in pixels.
 const MOST: usize = 1200;
 
-/// Reduces a line to about this many points: the lowest and highest of each interval, every gap, and the end, next to
-/// which the name of the line is written.
+/// Reduces a line to about this many points: the lowest and highest points of each interval, every gap, and the end,
+/// where the name of the line is written.
 pub fn thinned(points: impl IntoIterator<Item = Point>, most: usize) -> Vec<Point> {
     let points = points.into_iter();
     let (least, greatest) = points.size_hint();

@@ -1,8 +1,8 @@
 //! The canvas for figures, with colours, pens and fonts. The crate plotters draws each mark, and the canvas stores the
 //! marks in order with their hover texts.
 //!
-//! Plotters rounds every coordinate to a whole pixel, so each mark is drawn [`FINE`] times larger and then shown at its
-//! real size. Sizes here are in displayed pixels.
+//! Plotters rounds every coordinate to a whole pixel, so each mark is drawn [`FINE`] times larger and is then displayed
+//! at its real size. Sizes in this module are in displayed pixels.
 
 use maud::{PreEscaped, html};
 use plotters::element::{DashedPathElement, Drawable, PointCollection};
@@ -103,7 +103,7 @@ pub fn shortened(text: &str, room: f64) -> String {
 #[derive(Default)]
 pub struct Canvas {
     marks: String,
-    /// Whether marks show their values when the pointer is over them; only wide screens have a pointer.
+    /// Whether marks show their values when the pointer is over them; only wide screens are assumed to have a pointer.
     pub is_hovered: bool,
 }
 
@@ -185,7 +185,7 @@ impl Canvas {
         self.put(Circle::new(place(at), px(radius), style));
     }
 
-    /// Writes text such that the point is at the given position of the text; `scale` 1 is the usual size.
+    /// Writes text so that the point is at the given position within the text; a `scale` of 1 is the usual size.
     pub fn text(
         &mut self,
         text: &str,

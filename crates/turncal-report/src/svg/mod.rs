@@ -24,7 +24,7 @@ pub fn draw(plot: &Plot) -> String {
     draw_at(plot, WIDTHS[0])
 }
 
-/// The SVG document of a plot with this width; the narrower the plot, the fewer panels are side by side.
+/// The SVG document of a plot with this width; a narrower plot has fewer panels side by side.
 pub fn draw_at(plot: &Plot, width: u32) -> String {
     let mut on = Canvas::default();
     on.is_hovered = width == WIDTHS[0];

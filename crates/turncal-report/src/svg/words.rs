@@ -77,7 +77,8 @@ pub fn title(panel: &Panel, room: f64) -> Vec<String> {
     lines.into_iter().map(|line| line.into_owned()).collect()
 }
 
-/// Lines with the names of the series. The first line is next to the title, and is empty if there is no space.
+/// Lines with the names of the series. The first line is next to the title, and is empty if there is no space for
+/// names.
 pub fn keys(panel: &Panel, room: f64) -> Vec<Vec<&Series>> {
     let mut lines: Vec<(f64, Vec<&Series>)> = vec![(0.0, Vec::new())];
     for series in &panel.series {

@@ -16,7 +16,7 @@ pub fn short(verdict: &Verdict) -> &'static str {
     }
 }
 
-/// The last column of the table: the verdict if the reading is as stated, otherwise whether the reading gives the
+/// The last column of the table: for the stated reading, the verdict; for other readings, whether the reading gives the
 /// figures in the paper.
 pub fn of_row(column: &Column, row: &Row) -> String {
     match row.reading.kind {

@@ -1,4 +1,4 @@
-//! Makes links from events.
+//! Makes links from the events of a recording.
 
 use nalgebra::{DMatrix, DVector};
 

@@ -10,8 +10,8 @@ use crate::calibration::chain::effects::Effect;
 #[derive(Debug, Clone)]
 pub struct Drive {
     pub effect: Effect,
-    /// Number of the event among the events of its effect: the number of its move, of its position, or of the dwell
-    /// that follows it.
+    /// Number of the event among all events of its effect: the number of its move or position, or of the dwell after
+    /// it.
     pub event: usize,
     /// Change of the states for a unit disturbance, one column per disturbance.
     pub by: DMatrix<f64>,
@@ -57,7 +57,7 @@ impl Transition {
         rows += by;
     }
 
-    /// Appends a disturbance of the states, starting with the state `first`.
+    /// Appends a disturbance that acts on the states, starting with the state `first`.
     pub fn drive(&mut self, effect: Effect, event: usize, first: usize, root: &DMatrix<f64>) {
         if root.amax() > 0.0 {
             let mut by = DMatrix::zeros(self.offset.len(), root.ncols());

@@ -23,7 +23,7 @@ pub struct StepModel<const M: usize> {
 /// a state.
 const KEPT: usize = 32;
 
-/// The sequence of a part. The next part reuses this sequence as far as its own sequence is the same.
+/// The sequence of a part. The next part reuses this sequence as far as the two sequences agree.
 pub struct Course<const M: usize, const G: usize> {
     pub models: Vec<StepModel<M>>,
     /// All events, with the gains of observations.
@@ -55,7 +55,7 @@ pub struct Gain<const M: usize, const G: usize> {
     pub log_determinant: f64,
 }
 
-/// Moving states `U g + m` for given `g`, and information on `g`.
+/// States `U g + m` that change within the part, for given `g`, and the information on `g`.
 #[derive(Clone)]
 pub struct Known<const M: usize, const G: usize> {
     /// Matrix U.

@@ -56,7 +56,7 @@ impl Finding {
         Self::new(Kind::StatementDoubted, doubt, figures)
     }
 
-    /// The finding, reduced to a note if the σ, which include the effect, grew by less than half.
+    /// The finding; if the σ include the effect and increased by less than half, it is reduced to a note.
     pub fn of_growth(self, growth: f64) -> Self {
         if growth < MATTERS {
             self.at(Level::Note)
@@ -73,7 +73,7 @@ impl Finding {
         }
     }
 
-    /// Severity. Kinds from another version that are unknown here have the level `care`.
+    /// Severity. Kinds from another version that this version does not know have the level `care`.
     pub fn level(&self) -> Level {
         let of_kind = || Kind::named(&self.kind).map_or(Level::Care, Kind::level);
         self.level.unwrap_or_else(of_kind)

@@ -26,7 +26,7 @@ pub enum Word {
     /// Every limit of a specification is met.
     #[serde(rename = "pass")]
     Pass,
-    /// No limit is exceeded with certainty, but some may be.
+    /// No limit is certainly exceeded, but some may be exceeded.
     #[serde(rename = "undecided")]
     Undecided,
     /// A limit is exceeded.
@@ -64,7 +64,7 @@ impl fmt::Display for Word {
 pub struct Verdict {
     /// The word.
     pub word: Word,
-    /// Codes such as `W07`; empty for a good result.
+    /// Codes such as `W07`; the list is empty for a good result.
     pub reasons: Vec<String>,
 }
 

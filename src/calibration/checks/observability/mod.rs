@@ -44,8 +44,8 @@ pub struct Direction {
     /// Posterior σ of the combination divided by its prior σ, from 0 (known) to 1 (not observed).
     pub remaining: f64,
     /// A description such as `gyro scale z with gyro bias z` or `gyro misalignment xy against gyro misalignment yx`:
-    /// `with` for the same sign, `against` for the opposite sign of parameters and of the initial attitude that is
-    /// correlated with them.
+    /// `with` means that the parameters (and the initial attitude that is correlated with them) have the same sign,
+    /// `against` that they have opposite signs.
     pub words: String,
     /// Names and components of the major parameters in the combination; the largest component is positive, and the
     /// squares of all components sum to one.

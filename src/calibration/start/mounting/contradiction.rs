@@ -27,9 +27,10 @@ impl fmt::Display for Contradiction {
             Self::Sensitivity(sensitivity) => sensitivity.fmt(f),
             Self::Quaternions(said) => f.write_str(said),
             Self::Unexplained => f.write_str(
-                "the gyros, the accelerometers and the motion stated in run.toml contradict each other, and no other \
-                 axis order or sensitivity resolves this. Compare the turns shown by turncal check: the logs may be \
-                 from different runs or clocks, rows may be lost, labels may be wrong, or an axis may be dead",
+                "the gyros, the accelerometers and the motion stated in run.toml contradict each other, and no \
+                 different axis order or sensitivity removes the contradiction. Compare with the turns that turncal \
+                 check shows: the logs may be from different runs or clocks, rows may be lost, labels may be wrong, \
+                 or an axis may be dead",
             ),
             Self::Exchanged => f.write_str(
                 "the gyro and accelerometer columns are swapped: gravity appears in the columns that run.toml names \

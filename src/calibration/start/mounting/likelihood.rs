@@ -11,8 +11,8 @@ use crate::calibration::parameters::{ParameterVector, parameter};
 use crate::calibration::start::equations::{Equations, OfTriad, Rows, of, of_sensitivity};
 use crate::imu::{AxisOrder, PerSensor, Sensor};
 
-/// Factors by which stated noise and prior may be too small. All factors are equally likely, so that neither an
-/// inaccurate prior nor non-white motion favours another axis order.
+/// Factors by which stated noise and prior may be too small. All factors are equally likely, so neither an inaccurate
+/// prior nor non-white motion favours a wrong axis order.
 #[derive(Debug, Clone, Copy)]
 pub struct TooSmall {
     pub noise: &'static [f64],

@@ -62,7 +62,7 @@ fn known_from(problem: &Problem, motion: &Motion) -> &'static str {
     match problem.model.aiding {
         Aiding::Table => "the table attitudes",
         Aiding::Velocity if motion.labels.is_empty() => {
-            "the gravity direction before and after moves and Earth rate"
+            "gravity directions before and after moves, and Earth rate"
         }
         Aiding::Velocity => "the labels and the gravity direction before and after moves",
     }
@@ -215,7 +215,7 @@ impl Part {
 }
 
 /// The log-likelihood of each gyro axis order, and of the hypothesis that no order fits, given the motion of a run with
-/// the dwells of a problem. The accelerometer axes are taken as stated.
+/// the dwells of a problem. The accelerometer axes are assumed to be as stated.
 pub fn orders_of_gyros(problem: &Problem, run: &Run) -> Vec<(AxisOrder, f64, f64)> {
     let hypotheses = Hypotheses::of(problem, run, &Motion::of(problem, 0, run));
     let weighed = |gyro| {

@@ -52,8 +52,8 @@ pub struct Move {
 pub struct Turned {
     /// `C` from the axes after the rotation to the axes before it.
     pub rotation: Matrix3<f64>,
-    /// Effect of the gyro sensitivity on the total rotation, about the axes before the rotation, rad. The gyro zero is
-    /// the output at rest.
+    /// Effect of the gyro sensitivity on the total rotation, about the axes before the rotation, rad. The gyro output
+    /// at rest is used as the gyro zero.
     pub partials: OfTriad<3>,
 }
 
@@ -73,7 +73,7 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// Whether the gyros miss any turn by more than this fraction of its angle.
+    /// Whether the angle of any turn from the gyros is wrong by more than this fraction.
     pub fn misses_a_turn(&self, part: f64) -> bool {
         self.moves.iter().any(|of| {
             let turned = &of.turns[0].rotation;

@@ -109,7 +109,7 @@ impl fmt::Display for Sensitivity {
             )?,
             Sensor::Accel => write!(
                 f,
-                "{} {measure} gravity as {} m/s² at rest, {times} times the true value",
+                "{} {measure} gravity at rest as {} m/s², {times} times the true value",
                 self.named("the accelerometers"),
                 three_digits(factor * STANDARD_GRAVITY)
             )?,
@@ -120,7 +120,7 @@ impl fmt::Display for Sensitivity {
             let others: Vec<String> = others.iter().map(|&other| three_digits(other)).collect();
             write!(
                 f,
-                " (a factor of {} is almost equally likely)",
+                " (a factor of {} is almost equally probable)",
                 others.join(", ")
             )?;
         }

@@ -35,7 +35,7 @@ pub fn unwritable(target: &Path, doing: &str, error: &io::Error) -> FileError {
     FileError::io(target, doing, error, advice)
 }
 
-/// Unfinished outputs of this process, for the thread that ends the process on a signal.
+/// List of the unfinished outputs of this process, used by the thread that ends the process on a signal.
 pub struct Unfinished(Receiver<Beside>);
 
 impl Unfinished {
@@ -46,7 +46,7 @@ impl Unfinished {
     }
 
     /// Removes the unfinished outputs, for a process that is about to end. Threads that start, finish or abandon an
-    /// output after this call wait until the process ends.
+    /// output after this call wait until the process has ended.
     pub fn abandon(self) {
         ENDING.store(true, Ordering::SeqCst);
         for beside in self.0.try_iter() {
@@ -166,7 +166,7 @@ impl Stage {
         };
         if exists && fs::rename(&old, &self.target).is_err() {
             let stage = self.beside.stage.display();
-            let doing = format!("put the output in place (the old output is in {stage})");
+            let doing = format!("put the output in its place (the old output is in {stage})");
             let advice = "Move it back by hand.";
             return Err(FileError::io(&self.target, &doing, &error, advice));
         }

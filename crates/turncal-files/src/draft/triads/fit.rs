@@ -10,12 +10,12 @@ const TERMS: usize = 16;
 /// Factor s, s w₀, s c and s w₀ × c.
 const UNKNOWNS: usize = 10;
 
-/// Orders of the gyro axes about x, y and z, with their signs. Of two opposite orders, only one is included.
+/// All orders of the gyro axes about x, y and z, with their signs. Of two opposite orders, only one is included.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Order([(usize, f64); 3]);
 
 impl Order {
-    /// The order in which the columns are written comes first.
+    /// The first order is that in which the columns are written.
     pub fn all() -> impl Iterator<Item = Self> {
         let orders = [
             [0, 1, 2],
@@ -67,7 +67,7 @@ pub struct Moments {
     squares: [f64; 3],
 }
 
-/// Fractions of the squared changes that remain after the fit.
+/// Remaining fractions of the squared changes after the fit.
 pub struct Ratios {
     pub of_axes: [f64; 3],
     pub of_all: f64,

@@ -1,4 +1,4 @@
-//! The size of a count, as stated or measured.
+//! The size of a count, either stated or measured.
 
 use crate::draft::motion::TOLERANCE;
 use crate::draft::name::Unit;
@@ -18,7 +18,7 @@ const PER_DEGREE: [f64; 17] = [
 pub struct Scale {
     /// The file's quantity per second for one rad/s or m/s².
     pub value: f64,
-    /// Relative uncertainty from the recording.
+    /// Relative uncertainty of the value from the recording.
     pub off: f64,
     pub why: String,
 }
@@ -35,10 +35,10 @@ impl Scale {
         })
     }
 
-    /// Size of a count from the magnitude of gravity at rest, in counts per g, if the zero is nominal.
+    /// Size of a count, in counts per g, from the magnitude of gravity at rest, assuming that the zero is nominal.
     pub fn of_gravity(per_g: f64) -> Self {
         let sheet = [2f64.powf(per_g.log2().round())];
-        let by = "the magnitude of gravity at rest, if the zero offset is zero";
+        let by = "the magnitude of gravity at rest, assuming that the zero offset is zero";
         Self::measured(per_g, ("g", STANDARD_GRAVITY), &sheet, by)
     }
 
@@ -67,7 +67,9 @@ impl Scale {
             None => Self {
                 value: measured / one,
                 off: 2.0 * TOLERANCE,
-                why: format!("{measured} counts per {of}, from {by}; prefer the data-sheet value"),
+                why: format!(
+                    "{measured} counts per {of}, estimated from {by}; prefer the value in the data sheet"
+                ),
             },
         }
     }

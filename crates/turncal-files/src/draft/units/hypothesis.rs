@@ -1,4 +1,4 @@
-//! A possible unit of rows, and the evidence of gravity at rest and turns.
+//! A possible unit of the rows, with the evidence from gravity at rest and from turns.
 
 use crate::draft::motion::Motion;
 use crate::draft::name::Unit;
@@ -6,7 +6,7 @@ use turncal::imu::{Output, PerSensor, Sensor};
 use turncal::number::rounded;
 use turncal::units::STANDARD_GRAVITY;
 
-/// Two gyro rates or units can be distinguished by turns if they differ by this factor.
+/// Turns can distinguish two gyro rates or units that differ by this factor.
 pub const TURNS_TOLD_APART: f64 = 1.3;
 /// Gravity at rest and turns distinguish units that differ by more than this factor, because raw sensors may be off by
 /// tenths.
@@ -78,7 +78,9 @@ impl Hypothesis {
         };
         match (sensor, self.fits()) {
             (Sensor::Accel, true) => format!("{} at rest", rounded(motion.gravity, 4)),
-            (Sensor::Accel, false) => format!("the magnitude at rest is {factor} times gravity"),
+            (Sensor::Accel, false) => {
+                format!("the magnitude of the specific force at rest is {factor} times gravity")
+            }
             (Sensor::Gyro, true) => {
                 "integrated gyro angles match the change of gravity direction".to_owned()
             }
