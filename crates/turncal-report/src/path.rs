@@ -1,6 +1,8 @@
 //! Report on a path: expected σ and table time, the value of each move, what the path does not show, and whether it
 //! decides a specification.
 
+mod shipped;
+
 use serde::Serialize;
 
 use super::navigation;
@@ -11,6 +13,7 @@ use turncal::calibration::{
 use turncal::imu::{AXES, InstallationForm};
 use turncal::lot::{Check, Verdict};
 use turncal::simulation::Scenario;
+use turncal::study::design::Shipped;
 use turncal::study::navigation::MethodOutlook;
 use turncal::study::path::{Evaluation, PathStudy, Without};
 use turncal::turntable::{Moves, Rotation};
@@ -32,6 +35,8 @@ pub struct Report<'a> {
     pub evaluation: &'a Evaluation,
     /// Limits of the specification to be decided by the calibration, if any.
     pub checks: Option<&'a [Check]>,
+    /// Other paths in the same time; empty for no comparison.
+    pub shipped: &'a [Shipped],
 }
 
 /// A combination of parameters or an error term that the path does not show.
@@ -64,6 +69,10 @@ impl Report<'_> {
             self.with
         )];
         document.both(self.groups());
+        document.both(shipped::table(
+            &self.evaluation.bound.estimate,
+            self.shipped,
+        ));
         document.both(self.facts(&navigated));
         document.both(self.moves());
         document.both(table(&not_shown));
@@ -244,6 +253,7 @@ impl Report<'_> {
             "without": without.collect::<Value>(),
             "not_shown": not_shown,
             "not_decided": self.checks.map(|_| self.not_decided()),
+            "shipped": shipped::data(self.shipped),
         })
     }
 }

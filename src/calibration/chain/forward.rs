@@ -29,7 +29,8 @@ pub struct Passed {
 }
 
 /// The filter after a link: mean given zero constants, effect of the constants, and covariance of the states.
-struct Forward {
+#[derive(Debug, Clone)]
+pub struct Forward {
     mean: DVector<f64>,
     by_constants: DMatrix<f64>,
     covariance: DMatrix<f64>,
@@ -87,7 +88,7 @@ impl Chain {
 
 impl Forward {
     /// The filter before the first link.
-    fn new(states: usize, constants: usize) -> Self {
+    pub fn new(states: usize, constants: usize) -> Self {
         Self {
             mean: DVector::zeros(states),
             by_constants: DMatrix::zeros(states, constants),
@@ -100,7 +101,7 @@ impl Forward {
     ///
     /// # Errors
     /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
-    fn pass(&mut self, link: &Link, sizes: &Sizes) -> Result<Passed, CalibrationError> {
+    pub fn pass(&mut self, link: &Link, sizes: &Sizes) -> Result<Passed, CalibrationError> {
         let transition = &link.transition;
         let mean = &transition.states * &self.mean + &transition.offset;
         let by_constants = &transition.states * &self.by_constants + &transition.constants;
