@@ -301,7 +301,7 @@ pub fn evaluate(
             moves: &moves_in_words(&study.scenario),
             evaluation: &evaluation,
             checks: checks.as_deref(),
-            shipped: &[],
+            design: None,
         };
         Ok::<_, PathError>(Report(report.document()))
     });

@@ -13,7 +13,7 @@ use turncal::calibration::{
 use turncal::imu::{AXES, InstallationForm};
 use turncal::lot::{Check, Verdict};
 use turncal::simulation::Scenario;
-use turncal::study::design::Shipped;
+use turncal::study::design::Design;
 use turncal::study::navigation::MethodOutlook;
 use turncal::study::path::{Evaluation, PathStudy, Without};
 use turncal::turntable::{Moves, Rotation};
@@ -35,8 +35,8 @@ pub struct Report<'a> {
     pub evaluation: &'a Evaluation,
     /// Limits of the specification to be decided by the calibration, if any.
     pub checks: Option<&'a [Check]>,
-    /// Other paths in the same time; empty for no comparison.
-    pub shipped: &'a [Shipped],
+    /// The design of the path, if it was designed.
+    pub design: Option<&'a Design>,
 }
 
 /// A combination of parameters or an error term that the path does not show.
@@ -69,10 +69,9 @@ impl Report<'_> {
             self.with
         )];
         document.both(self.groups());
-        document.both(shipped::table(
-            &self.evaluation.bound.estimate,
-            self.shipped,
-        ));
+        if let Some(design) = self.design {
+            document.both(shipped::table(design));
+        }
         document.both(self.facts(&navigated));
         document.both(self.moves());
         document.both(table(&not_shown));
@@ -253,7 +252,7 @@ impl Report<'_> {
             "without": without.collect::<Value>(),
             "not_shown": not_shown,
             "not_decided": self.checks.map(|_| self.not_decided()),
-            "shipped": shipped::data(self.shipped),
+            "shipped": self.design.map(shipped::data),
         })
     }
 }

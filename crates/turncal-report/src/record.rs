@@ -1,6 +1,7 @@
 //! Report on a calibration file, as it was written.
 
 use super::calibration::{cross_validation, in_order};
+use super::ieee;
 use super::prelude::*;
 use super::values;
 use turncal::calibration::Calibration;
@@ -16,6 +17,7 @@ pub fn document(calibration: &Calibration, name: &str) -> Document {
     document.both(parameters(calibration));
     document.both(noise(calibration));
     document.both(terms(calibration));
+    document.both(ieee::table(calibration));
     document
 }
 

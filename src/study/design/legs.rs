@@ -32,7 +32,6 @@ impl<'a> Legs<'a> {
         let mut study = study.clone();
         study.scenario.integrator.period = PERIOD;
         study.scenario.chamber = None;
-        study.options.auto_terms = false;
         let (run, truth, terms) = study.record()?;
         let problem = Problem::new(&run, &study.options);
         let start = coarse_start(&problem)?.attitudes[0];
@@ -57,7 +56,7 @@ impl<'a> Legs<'a> {
         run.standstill.sigma = PerSensor::from_fn(|_| Some(0.0));
         let problem = Problem::new(&run, &study.options);
         let start = AttitudePrior { mean, ..self.start };
-        Ok(Leg::all(&problem, (&truth, &terms), start)?)
+        Ok(Leg::all(&problem, (&truth, &terms), &[start])?)
     }
 
     /// Makes the missing legs of some paths.
@@ -104,5 +103,51 @@ impl<'a> Legs<'a> {
     /// Number of legs made.
     pub fn count(&self) -> usize {
         self.made.len()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{along, expected};
+    use super::*;
+    use crate::calibration::Group;
+    use crate::study::path::Named;
+
+    /// Turns about all axes, of whole and of part turns; dwells twice as long as those of the legs have biases that vary.
+    #[test]
+    fn a_path_joined_from_short_recordings_has_the_sigma_of_its_own_recording() {
+        for (scenario, by_hand) in [("demo", false), ("mems", true)] {
+            let named = Named {
+                scenario: Some(scenario),
+                by_hand,
+                ..Named::default()
+            };
+            let mut setting = PathStudy::setting(&named).unwrap();
+            setting.options.auto_terms = false;
+            let table = setting.scenario.table.clone();
+            let machine = if by_hand {
+                Machine::Hand
+            } else {
+                Machine::Table(&table)
+            };
+            let all = machine.turns();
+            let turns: Vec<Turn> = (0..14).map(|k| all[7 * k % all.len()].clone()).collect();
+            for (dwell, within) in [(10.0, 0.03), (20.0, 0.2)] {
+                let path = machine.path(&machine.start(), &turns, dwell);
+                let study = along(&setting, path).unwrap();
+                let mut legs = Legs::new(machine, &study).unwrap();
+                legs.make([&turns[..]].into_iter()).unwrap();
+                let joined = legs.sigma(&turns, dwell).unwrap();
+                let whole = expected(&study).unwrap();
+                for group in Group::all() {
+                    let [joined, own] = [&joined, &whole.sigma()].map(|of| group.rms(of, &whole));
+                    let ratio = joined.unwrap() / own.unwrap();
+                    assert!(
+                        (ratio - 1.0).abs() < within,
+                        "{scenario} {dwell} {group:?}: {ratio}"
+                    );
+                }
+            }
+        }
     }
 }

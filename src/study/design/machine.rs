@@ -228,3 +228,30 @@ fn radians(degrees: &[i32]) -> Vec<f64> {
         .map(|&angle| f64::from(angle) * DEGREE)
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::models::{Place as From, turntable};
+
+    #[test]
+    fn a_turn_that_is_exchanged_leaves_the_later_positions_of_a_table() {
+        let (table, _) = turntable("two-axis", &From::Embedded).unwrap();
+        let machine = Machine::Table(&table);
+        let all = machine.turns();
+        let path: Vec<Turn> = (0..6).map(|k| all[5 * k % all.len()].clone()).collect();
+        let end = |turns: &[Turn]| {
+            let place = |place, turn: &Turn| machine.after(&place, turn);
+            turns.iter().fold(machine.start(), place).key()
+        };
+        for turn in &all {
+            for at in 0..5 {
+                let other = machine.spliced(&path, at..at + 1, std::slice::from_ref(turn));
+                assert_eq!(end(&other), end(&path), "{at} {turn:?}");
+                // The tilt axis is slower than the table axis.
+                let slow = other.iter().filter(|turn| turn.degrees[0] != 0);
+                assert!({ slow }.all(|turn| turn.rate <= 60));
+            }
+        }
+    }
+}

@@ -14,7 +14,7 @@ mod text;
 use rayon::prelude::*;
 
 use super::path::{Evaluation, PathError, PathStudy};
-use crate::calibration::{Estimate, Problem, bound};
+use crate::calibration::{CalibrationError, Estimate, Journey, Leg, Problem, coarse_start};
 use crate::lot::Specification;
 use goal::Goals;
 use legs::Legs;
@@ -55,6 +55,8 @@ pub struct Design {
     pub study: PathStudy,
     /// Expected results.
     pub evaluation: Evaluation,
+    /// Expected σ as those of the other paths.
+    pub estimate: Estimate,
     /// Other paths in the same time.
     pub shipped: Vec<Shipped>,
     /// The path file.
@@ -97,6 +99,7 @@ impl DesignStudy {
         Ok(Design {
             text: text::text(&machine, &best.turns, dwell, &self.comment(duration)),
             evaluation: study.evaluate()?,
+            estimate: expected(&study)?,
             shipped: Shipped::all(setting, duration)?,
             study,
         })
@@ -234,9 +237,17 @@ fn along(setting: &PathStudy, path: crate::turntable::Path) -> Result<PathStudy,
     })
 }
 
-/// Expected σ of a path.
+/// Expected σ of a path; with automatic terms, if every term that may be absent has its usual size.
 fn expected(study: &PathStudy) -> Result<Estimate, PathError> {
     let (run, truth, terms) = study.record()?;
     let problem = Problem::new(&run, &study.options);
-    Ok(bound(&problem, &truth, &terms)?.estimate)
+    let start = coarse_start(&problem)?.attitudes;
+    let at = (&truth, &terms);
+    let mut journey = Journey::new(&problem, at);
+    for leg in Leg::all(&problem, at, &start)? {
+        journey.go(&leg, 1.0)?;
+    }
+    let duration = run.recording.imu.duration();
+    let undetermined = CalibrationError::Diverged { time: duration };
+    Ok(journey.estimate(&truth).ok_or(undetermined)?)
 }

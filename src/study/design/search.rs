@@ -11,8 +11,8 @@ use crate::study::path::PathError;
 pub const SHORTEST_DWELL: f64 = 5.0;
 /// Most turns of a path.
 const MOST_TURNS: usize = 32;
-/// Most legs that a search makes, and most paths that it tries.
-const MOST_LEGS: usize = 2500;
+/// Most legs that the exchange makes, and most paths that it tries.
+const MOST_LEGS: usize = 2000;
 const MOST_PATHS: usize = 3000;
 /// Smallest part of its cost by which an exchange improves a path.
 const WORTH: f64 = 1e-3;
@@ -57,7 +57,6 @@ impl<'a, 'm> Search<'a, 'm> {
     /// or, if the goals are limits, all are reached.
     pub fn greedy(&mut self, dwell: f64, until_reached: bool) -> Result<Vec<Turn>, PathError> {
         let mut turns: Vec<Turn> = Vec::new();
-        let all = self.legs.machine.turns();
         while turns.len() < MOST_TURNS {
             let Some(now) = self.legs.sigma(&turns, dwell) else {
                 break;
@@ -65,29 +64,21 @@ impl<'a, 'm> Search<'a, 'm> {
             if until_reached && self.goals.worst(&now) <= 1.0 {
                 break;
             }
-            let left = self.time - self.duration(&turns, dwell);
-            let longer = all
+            let left = self.time - self.duration(&turns, dwell) - dwell;
+            let mut next = self.legs.machine.turns();
+            next.retain(|turn| self.legs.machine.duration(turn) <= left);
+            let longer = next
                 .iter()
                 .map(|turn| [&turns[..], &[turn.clone()]].concat());
-            let takes = |path: &Vec<Turn>| {
-                let last = path
-                    .last()
-                    .map_or(0.0, |turn| self.legs.machine.duration(turn));
-                last + dwell
-            };
-            let longer: Vec<Vec<Turn>> = longer.filter(|path| takes(path) <= left).collect();
-            let times: Vec<f64> = longer.iter().map(takes).collect();
+            let longer: Vec<Vec<Turn>> = longer.collect();
             let before = self.goals.distance(&now);
-            let gain = |search: &Self, path: &[Turn]| {
-                let sigma = search.legs.sigma(path, dwell)?;
-                Some(before - search.goals.distance(&sigma))
+            let loss_per_second = |search: &Self, path: &[Turn]| {
+                let after = search.goals.distance(&search.legs.sigma(path, dwell)?);
+                let time = search.legs.machine.duration(path.last()?) + dwell;
+                Some((after - before) / time)
             };
-            let gains = self.each(&longer, gain)?;
-            let rates = gains
-                .iter()
-                .zip(&times)
-                .map(|(gain, time)| gain.map(|gain| gain / time));
-            let Some(best) = best(rates.map(|rate| rate.map(|rate| -rate))) else {
+            let losses = self.each(&longer, loss_per_second)?;
+            let Some(best) = best(losses.into_iter()) else {
                 break;
             };
             turns.clone_from(&longer[best]);
@@ -101,7 +92,9 @@ impl<'a, 'm> Search<'a, 'm> {
             return Ok(turns);
         };
         let (mut at, mut unchanged) = (0, 0);
-        while unchanged <= turns.len() && self.is_open() {
+        self.tried = 0;
+        let most = self.legs.count() + MOST_LEGS;
+        while unchanged <= turns.len() && self.tried < MOST_PATHS && self.legs.count() < most {
             at %= turns.len() + 1;
             let changed = self.changed(&turns, at);
             let costs = self.each(&changed, Self::cost)?;
@@ -114,10 +107,6 @@ impl<'a, 'm> Search<'a, 'm> {
             }
         }
         Ok(turns)
-    }
-
-    fn is_open(&self) -> bool {
-        self.legs.count() < MOST_LEGS && self.tried < MOST_PATHS
     }
 
     /// Cost of a path that uses the whole time; `None` if its dwells are too short.

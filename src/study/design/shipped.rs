@@ -8,8 +8,8 @@ use crate::models::{self, Place, Room};
 use crate::study::path::{PathError, PathStudy};
 use crate::turntable::{Moves, Path};
 
-/// Smallest factor of the dwells: with shorter ones, the path is not the one that was meant.
-const SHORTEST: f64 = 0.2;
+/// Shortest dwell, s.
+const SHORTEST: f64 = 1.0;
 
 /// An embedded path, stretched or shortened to a time.
 #[derive(Debug, Clone)]
@@ -57,11 +57,16 @@ fn stretched(
     let moving = study.scenario.duration()? - standing;
     let factor = (time - moving) / standing;
     path.first_dwell *= factor;
-    match &mut path.moves {
-        Moves::Axes { steps, .. } => steps.iter_mut().for_each(|step| step.dwell *= factor),
-        Moves::Body { steps, .. } => steps.iter_mut().for_each(|step| step.dwell *= factor),
+    let dwells: Vec<&mut f64> = match &mut path.moves {
+        Moves::Axes { steps, .. } => steps.iter_mut().map(|step| &mut step.dwell).collect(),
+        Moves::Body { steps, .. } => steps.iter_mut().map(|step| &mut step.dwell).collect(),
+    };
+    let mut shortest = f64::INFINITY;
+    for dwell in dwells {
+        *dwell *= factor;
+        shortest = shortest.min(*dwell);
     }
-    let study = (factor >= SHORTEST).then(|| along(setting, path, name));
+    let study = (shortest >= SHORTEST).then(|| along(setting, path, name));
     let estimate = study.flatten().map(|study| expected(&study)).transpose()?;
     Ok(Shipped {
         name,

@@ -80,7 +80,7 @@ impl Design {
             moves: &moves_in_words(&design.study.scenario),
             evaluation: &design.evaluation,
             checks: checks.as_deref(),
-            shipped: &design.shipped,
+            design: Some(&design),
         }
         .document();
         if let Some(output) = &self.output {

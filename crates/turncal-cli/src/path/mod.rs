@@ -87,7 +87,7 @@ impl Evaluate {
             moves: &moves,
             evaluation: &evaluation,
             checks: checks.as_deref(),
-            shipped: &[],
+            design: None,
         };
         let document = report.document();
         begun.deliver(&document)?;
