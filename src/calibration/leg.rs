@@ -1,9 +1,9 @@
 //! Legs of a path (a move and the dwell after it): each is made once, and joined to the bounds of many paths.
 
-use nalgebra::DMatrix;
+use nalgebra::{Cholesky, DMatrix};
 
 use super::bound::at_truth;
-use super::chain::{Effect, Forward, Link, Sizes, Slip, States};
+use super::chain::{Effect, Forward, Link, Rows, Sizes, States, Transition};
 use super::constants::{inverse, parameters};
 use super::sizes::Effects;
 use super::{
@@ -13,12 +13,23 @@ use super::{
 use crate::imu::{PerSensor, TermVector, Triad};
 use crate::turntable::AxisError;
 
+/// Number of rows for the place of a new position.
+const PLACE: usize = 3;
+
 /// A move and the dwell after it, or the first dwell.
 #[derive(Debug, Clone)]
 pub struct Leg {
-    links: Vec<Link>,
-    /// Number of rows of the links that are not affected by the noise at rest: the position of each new dwell.
-    of_position: usize,
+    parts: Vec<Part>,
+}
+
+/// A link without its drives.
+#[derive(Debug, Clone)]
+struct Part {
+    link: Link,
+    /// Covariance of the drives: noise of the move, a new position.
+    driven: DMatrix<f64>,
+    /// Number of the first rows that are not affected by the noise at rest: the place of a new position.
+    of_place: usize,
 }
 
 /// Information on the parameters after some legs: the bound of their path with the stated noise, as [`super::bound`]; with
@@ -49,30 +60,46 @@ impl Leg {
         let chain = Effects::new(&problem).chain(&problem, &script)?;
         let mut legs: Vec<Self> = Vec::new();
         for link in chain.links {
-            match legs.get_mut(link.dwell) {
-                Some(leg) => leg.links.push(link),
-                None => legs.push(Self {
-                    of_position: if legs.is_empty() { 0 } else { 3 },
-                    links: vec![link],
-                }),
+            let is_new = link.dwell == legs.len();
+            let of_place = if is_new && !link.begins { PLACE } else { 0 };
+            let part = Part::new(link, of_place);
+            match legs.last_mut().filter(|_| !is_new) {
+                Some(leg) => leg.parts.push(part),
+                None => legs.push(Self { parts: vec![part] }),
             }
         }
         Ok(legs)
     }
+}
 
-    /// The leg with a dwell of another length, as a factor of the variance of its noise at rest.
-    fn dispersed(&self, factor: f64) -> Vec<Link> {
-        let mut links = self.links.clone();
-        for (number, link) in links.iter_mut().enumerate() {
-            let first = if number == 0 { self.of_position } else { 0 };
-            let of_dwell = link.rows.values.len() - first;
-            let root = factor.sqrt();
-            link.rows.states.rows_mut(first, of_dwell).unscale_mut(root);
-            let mut constants = link.rows.constants.rows_mut(first, of_dwell);
-            constants.unscale_mut(root);
-            link.transition.covariance *= factor;
+impl Part {
+    fn new(mut link: Link, of_place: usize) -> Self {
+        let count = link.transition.offset.len();
+        let mut driven = DMatrix::zeros(count, count);
+        for drive in std::mem::take(&mut link.transition.drives) {
+            // With stated noise, nothing slips.
+            if !matches!(drive.effect, Effect::Slip(_)) {
+                driven.gemm(1.0, &drive.by, &drive.by.transpose(), 1.0);
+            }
         }
-        links
+        Self {
+            link,
+            driven,
+            of_place,
+        }
+    }
+
+    /// The transition and rows if the variance of the noise at rest is multiplied by a factor.
+    fn dispersed(&self, factor: f64) -> (Transition, Rows) {
+        let (mut transition, mut rows) = (self.link.transition.clone(), self.link.rows.clone());
+        transition.covariance *= factor;
+        transition.covariance += &self.driven;
+        let of_dwell = self.of_place..rows.values.len();
+        let (first, count) = (of_dwell.start, of_dwell.len());
+        let root = factor.sqrt();
+        rows.states.rows_mut(first, count).unscale_mut(root);
+        rows.constants.rows_mut(first, count).unscale_mut(root);
+        (transition, rows)
     }
 }
 
@@ -99,26 +126,40 @@ impl Journey {
     /// # Errors
     /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
     pub fn go(&mut self, leg: &Leg, factor: f64) -> Result<(), CalibrationError> {
-        // With stated noise, nothing slips.
-        let sizes = [Slip::Mount, Slip::Base].into_iter();
-        let sizes = sizes.fold(Sizes::default(), |sizes, slip| {
-            sizes.with(Effect::Slip(slip), 0.0)
-        });
-        for link in leg.dispersed(factor) {
-            let seen = self.filter.pass(&link, &sizes)?.of_constants;
-            self.information.gemm_tr(1.0, &seen, &seen, 1.0);
+        for part in &leg.parts {
+            let (transition, rows) = part.dispersed(factor);
+            let time = part.link.time;
+            let seen = self.filter.step(&transition, &rows, &Sizes::default());
+            let (seen, _) = seen.ok_or(CalibrationError::Diverged { time })?;
+            let rows = &seen.of_constants;
+            self.information.gemm_tr(1.0, rows, rows, 1.0);
         }
         Ok(())
     }
 
     /// 1σ of the parameters of both triads; `None` if a constant is undetermined.
     pub fn sigma(&self) -> Option<ParameterVector> {
-        let (covariance, _) = inverse(&self.information)?;
+        let of_triads: Vec<(usize, usize)> = parameters(&self.constants).collect();
+        let (first, count) = (self.constants.len() - of_triads.len(), of_triads.len());
+        // The parameters last: the last block of the root is that of their covariance.
+        let is_other = |k: &usize| of_triads.iter().all(|(of, _)| of != k);
+        let others = (0..self.constants.len()).filter(is_other);
+        let order: Vec<usize> = others.chain(of_triads.iter().map(|&(k, _)| k)).collect();
+        let information = self.information.select_rows(&order).select_columns(&order);
+        // Scaled so that the diagonal is one.
+        let scale = information.diagonal().map(|value| value.sqrt().recip());
+        let scaled = DMatrix::from_fn(order.len(), order.len(), |i, j| {
+            information[(i, j)] * scale[i] * scale[j]
+        });
+        let root = Cholesky::new(scaled)?.unpack();
+        let mut inverse = DMatrix::identity(count, count);
+        let last = root.view((first, first), (count, count));
+        let solved = last.solve_lower_triangular_mut(&mut inverse);
         let mut sigma = ParameterVector::zeros();
-        for (k, index) in parameters(&self.constants) {
-            sigma[index] = covariance[(k, k)].sqrt();
+        for (k, &(_, index)) in of_triads.iter().enumerate() {
+            sigma[index] = inverse.column(k).norm() * scale[first + k];
         }
-        Some(sigma)
+        solved.then_some(sigma)
     }
 
     /// The truth, with its covariance; `None` if a constant is undetermined.

@@ -252,7 +252,7 @@ impl Report<'_> {
             "without": without.collect::<Value>(),
             "not_shown": not_shown,
             "not_decided": self.checks.map(|_| self.not_decided()),
-            "shipped": self.design.map(shipped::data),
+            "same_time": self.design.map(shipped::data),
         })
     }
 }

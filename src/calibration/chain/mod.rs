@@ -20,7 +20,7 @@ mod without;
 pub use backward::{Moments, Smoothed};
 pub use effects::{Dispersion, Effect, Sizes, Slip};
 pub use forward::{Filtered, Forward};
-pub use links::{Chain, Link};
+pub use links::{Chain, Link, Rows, Transition};
 pub use states::States;
 
 #[cfg(test)]

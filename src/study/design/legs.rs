@@ -4,7 +4,8 @@ use std::collections::{HashMap, HashSet};
 
 use rayon::prelude::*;
 
-use super::machine::{Machine, Place, Turn};
+use super::machine::Machine;
+use super::turn::{Place, Turn};
 use crate::calibration::{AttitudePrior, Journey, Leg, ParameterVector, Problem, coarse_start};
 use crate::imu::PerSensor;
 use crate::study::path::{PathError, PathStudy};

@@ -3,8 +3,9 @@
 use std::f64::consts::PI;
 use std::ops::Range;
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Matrix3;
 
+use super::turn::{Place, Turn, radians};
 use crate::attitude::exp;
 use crate::turntable::{AxesStep, BodyStep, Moves, Path, Profile, Rotation, Table};
 use crate::units::DEGREE;
@@ -24,37 +25,11 @@ const BETWEEN: [i32; 5] = [45, -45, 90, -90, 180];
 /// Full turns, in degrees.
 const FULL: [i32; 2] = [360, -360];
 
-/// A turn of each table axis, outermost first, or about each body axis, in whole degrees, at a rate in °/s.
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub struct Turn {
-    pub degrees: Vec<i32>,
-    pub rate: i32,
-}
-
-/// An attitude between turns.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Place {
-    /// Angles of the table axes, in degrees.
-    Table(Vec<i32>),
-    /// `C_b_n`.
-    Hand(Matrix3<f64>),
-}
-
 /// What turns the instrument.
 #[derive(Debug, Clone, Copy)]
 pub enum Machine<'a> {
     Table(&'a Table),
     Hand,
-}
-
-impl Place {
-    /// Integers that are equal for equal attitudes.
-    pub fn key(&self) -> Vec<i32> {
-        match self {
-            Self::Table(angles) => angles.iter().map(|angle| angle.rem_euclid(360)).collect(),
-            Self::Hand(attitude) => attitude.iter().map(|c| (1e4 * c).round() as i32).collect(),
-        }
-    }
 }
 
 impl Machine<'_> {
@@ -212,21 +187,6 @@ impl Machine<'_> {
             moves,
         }
     }
-}
-
-impl Turn {
-    /// Rotation vector about body axes, rad.
-    fn vector(&self) -> Vector3<f64> {
-        let angles = radians(&self.degrees);
-        Vector3::from_fn(|axis, _| angles.get(axis).copied().unwrap_or(0.0))
-    }
-}
-
-fn radians(degrees: &[i32]) -> Vec<f64> {
-    degrees
-        .iter()
-        .map(|&angle| f64::from(angle) * DEGREE)
-        .collect()
 }
 
 #[cfg(test)]

@@ -4,22 +4,23 @@
 //! Experiments*). The bound of each path is that of its recording: the legs of the chain of dwells are made once and
 //! joined, so that a path takes a millisecond.
 
+mod choice;
 mod goal;
 mod legs;
 mod machine;
 mod search;
 mod shipped;
 mod text;
-
-use rayon::prelude::*;
+mod turn;
 
 use super::path::{Evaluation, PathError, PathStudy};
 use crate::calibration::{CalibrationError, Estimate, Journey, Leg, Problem, coarse_start};
 use crate::lot::Specification;
+use crate::turntable::Path;
 use goal::Goals;
 use legs::Legs;
-use machine::{Machine, Turn};
-use search::{SHORTEST_DWELL, Search};
+use machine::Machine;
+use search::SHORTEST_DWELL;
 pub use shipped::Shipped;
 
 /// Time of a path without a specification, s.
@@ -28,14 +29,8 @@ const USUAL_TIME: f64 = 600.0;
 const LONGEST: f64 = 3600.0;
 /// Shortest time that allows a few turns, s.
 pub const SHORTEST: f64 = 60.0;
-/// Numbers of turns in the usual time among which the dwells of a first path are chosen.
-const TURNS: [f64; 3] = [14.0, 22.0, 32.0];
 /// Usual duration of a turn, s.
 const TURN: f64 = 8.0;
-/// Number of corrections of the dwells, because the goals are for σ of joined legs.
-const CORRECTIONS: usize = 6;
-/// Smallest difference between dwells, s.
-const HUNDREDTH: f64 = 0.01;
 
 /// A path to design.
 #[derive(Debug, Clone)]
@@ -63,20 +58,16 @@ pub struct Design {
     pub text: String,
 }
 
-/// A candidate with its exact σ.
-struct Candidate {
-    turns: Vec<Turn>,
-    dwell: f64,
-    estimate: Estimate,
-}
-
 impl DesignStudy {
     /// Designs the path.
     ///
     /// # Errors
     /// [`PathError`] if the setting does not allow a calibration.
     pub fn design(&self) -> Result<Design, PathError> {
-        let setting = &self.setting;
+        // The verdict on a limit is about the stated terms.
+        let mut setting = self.setting.clone();
+        setting.options.auto_terms &= self.specification.is_none();
+        let setting = &setting;
         let table = setting.scenario.table.clone();
         let machine = if setting.by_hand {
             Machine::Hand
@@ -90,7 +81,7 @@ impl DesignStudy {
         let dwell = (time / (tour.len() + 1) as f64 - TURN).max(SHORTEST_DWELL);
         let tour = along(setting, machine.path(&machine.start(), &tour, dwell))?;
         let mut legs = Legs::new(machine, &tour)?;
-        let goals = self.goals(&tour, time)?;
+        let goals = self.goals(setting, &tour, time)?;
         let best = self.best(&mut legs, &goals, time)?;
         let dwell = (best.dwell * 100.0).floor() / 100.0;
         let path = machine.path(&machine.start(), &best.turns, dwell);
@@ -106,11 +97,11 @@ impl DesignStudy {
     }
 
     /// The σ that decide every limit; without limits, the best of each group on the embedded paths.
-    fn goals(&self, tour: &PathStudy, time: f64) -> Result<Goals, PathError> {
+    fn goals(&self, setting: &PathStudy, tour: &PathStudy, time: f64) -> Result<Goals, PathError> {
         if let Some(specification) = &self.specification {
             return Ok(Goals::of_limits(specification, &expected(tour)?));
         }
-        let shipped = Shipped::all(&self.setting, time)?.into_iter();
+        let shipped = Shipped::all(setting, time)?.into_iter();
         let mut estimates: Vec<Estimate> = shipped.filter_map(|of| of.estimate).collect();
         if estimates.is_empty() {
             estimates.push(expected(tour)?);
@@ -139,97 +130,10 @@ impl DesignStudy {
             terms.join(", ")
         )
     }
-
-    /// The best path found, with its dwells.
-    fn best(&self, legs: &mut Legs, goals: &Goals, time: f64) -> Result<Candidate, PathError> {
-        let decide = self.specification.is_some();
-        let mut search = Search::new(legs, goals.clone(), time);
-        let mut first = Vec::new();
-        for turns in TURNS {
-            let dwell = (time.min(USUAL_TIME) / turns - TURN).max(SHORTEST_DWELL);
-            let turns = search.greedy(dwell, decide)?;
-            let dwell = if decide { dwell } else { search.dwell(&turns) };
-            first.push((turns, dwell));
-        }
-        let first = first.into_par_iter().map(|(turns, dwell)| {
-            let candidate = search.legs.candidate(turns, dwell)?;
-            self.fitted(&search, goals, candidate)
-        });
-        let first: Vec<Candidate> = first.collect::<Result<_, _>>()?;
-        let by_cost = |a: &Candidate, b: &Candidate| {
-            let [a, b] = [a, b].map(|of| self.cost(&search, goals, of));
-            a.total_cmp(&b)
-        };
-        let Some(first) = first.into_iter().min_by(by_cost) else {
-            return search.legs.candidate(Vec::new(), time);
-        };
-        if let Some(joined) = search.legs.sigma(&first.turns, first.dwell) {
-            search.goals = goals.corrected(&joined, &first.estimate.sigma());
-        }
-        search.time = search.duration(&first.turns, first.dwell);
-        let turns = search.exchange(first.turns.clone())?;
-        let exchanged = search.legs.candidate(turns.clone(), search.dwell(&turns))?;
-        search.time = time;
-        let exchanged = self.fitted(&search, goals, exchanged)?;
-        Ok(std::cmp::min_by(exchanged, first, |a, b| {
-            let [a, b] = [a, b].map(|of| self.cost(&search, goals, of));
-            a.total_cmp(&b)
-        }))
-    }
-
-    /// What is to be small: the time if limits are decided, otherwise σ.
-    fn cost(&self, search: &Search, goals: &Goals, of: &Candidate) -> f64 {
-        let cost = goals.cost(&of.estimate.sigma());
-        let is_decided = goals.worst(&of.estimate.sigma()) <= 1.0;
-        match self.specification {
-            Some(_) if is_decided => search.duration(&of.turns, of.dwell) / search.time - 2.0,
-            _ => cost,
-        }
-    }
-
-    /// With limits: the candidate with the shortest dwells that decide them, within the time.
-    fn fitted(
-        &self,
-        search: &Search,
-        goals: &Goals,
-        mut candidate: Candidate,
-    ) -> Result<Candidate, PathError> {
-        if self.specification.is_none() {
-            return Ok(candidate);
-        }
-        let longest = search.dwell(&candidate.turns);
-        let mut decided: Option<Candidate> = None;
-        for _ in 0..CORRECTIONS {
-            let worst = goals.worst(&candidate.estimate.sigma());
-            // σ decrease with the root of the time, or more slowly.
-            let dwell = candidate.dwell * (worst * worst * 1.01).clamp(0.3, 3.0);
-            let dwell = dwell.clamp(SHORTEST_DWELL.min(longest), longest);
-            let turns = candidate.turns.clone();
-            if worst <= 1.0 && decided.as_ref().is_none_or(|of| candidate.dwell < of.dwell) {
-                decided = Some(candidate);
-            } else if (dwell - candidate.dwell).abs() < HUNDREDTH {
-                return Ok(decided.unwrap_or(candidate));
-            }
-            candidate = search.legs.candidate(turns, dwell)?;
-        }
-        Ok(decided.unwrap_or(candidate))
-    }
-}
-
-impl Legs<'_> {
-    /// A path with its exact σ.
-    fn candidate(&self, turns: Vec<Turn>, dwell: f64) -> Result<Candidate, PathError> {
-        let path = self.machine.path(&self.machine.start(), &turns, dwell);
-        Ok(Candidate {
-            estimate: expected(&along(&self.study, path)?)?,
-            turns,
-            dwell,
-        })
-    }
 }
 
 /// The setting along a path.
-fn along(setting: &PathStudy, path: crate::turntable::Path) -> Result<PathStudy, PathError> {
+fn along(setting: &PathStudy, path: Path) -> Result<PathStudy, PathError> {
     let scenario = setting.scenario.clone().along(path, "designed");
     Ok(PathStudy {
         scenario: scenario.map_err(PathError::Words)?,

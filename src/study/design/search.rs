@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::goal::Goals;
 use super::legs::Legs;
-use super::machine::Turn;
+use super::turn::Turn;
 use crate::study::path::PathError;
 
 /// Shortest dwell of a designed path, s.
@@ -12,8 +12,8 @@ pub const SHORTEST_DWELL: f64 = 5.0;
 /// Most turns of a path.
 const MOST_TURNS: usize = 32;
 /// Most legs that the exchange makes, and most paths that it tries.
-const MOST_LEGS: usize = 2000;
-const MOST_PATHS: usize = 3000;
+const MOST_LEGS: usize = 1500;
+const MOST_PATHS: usize = 2500;
 /// Smallest part of its cost by which an exchange improves a path.
 const WORTH: f64 = 1e-3;
 

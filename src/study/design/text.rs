@@ -1,6 +1,7 @@
 //! A designed path as the text of a path file.
 
-use super::machine::{Machine, Turn};
+use super::machine::Machine;
+use super::turn::Turn;
 
 /// Widest line of a comment.
 const WIDTH: usize = 110;

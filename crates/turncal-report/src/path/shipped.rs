@@ -30,18 +30,22 @@ pub fn table(design: &Design) -> Table {
         )
 }
 
-/// Factor of the dwells and σ of every path by name.
+/// σ of the designed path, and factor of the dwells and σ of every other path by name.
 pub fn data(design: &Design) -> Value {
-    let one = |of: &Shipped| {
-        let estimate = of.estimate.as_ref();
+    let sigma = |estimate: Option<&Estimate>| {
         let sigma = Group::all().map(|group| (group.key(), rms(group, estimate).into()));
-        let sigma: Map<String, Value> = sigma.collect();
-        (
-            of.name.to_owned(),
-            json!({ "dwell_factor": of.factor, "sigma": sigma }),
-        )
+        sigma.collect::<Map<String, Value>>()
     };
-    Value::Object(design.shipped.iter().map(one).collect())
+    let one = |of: &Shipped| {
+        let figures = json!({ "dwell_factor": of.factor, "sigma": sigma(of.estimate.as_ref()) });
+        (of.name.to_owned(), figures)
+    };
+    let others: Map<String, Value> = design.shipped.iter().map(one).collect();
+    json!({
+        "every_term_of_usual_size": design.study.options.auto_terms,
+        "designed": sigma(Some(&design.estimate)),
+        "embedded": others,
+    })
 }
 
 fn rms(group: Group, estimate: Option<&Estimate>) -> Option<f64> {
