@@ -133,7 +133,7 @@ mod tests {
             };
             let all = machine.turns();
             let turns: Vec<Turn> = (0..14).map(|k| all[7 * k % all.len()].clone()).collect();
-            for (dwell, within) in [(10.0, 0.03), (20.0, 0.2)] {
+            for (dwell, within) in [(10.0, 0.05), (20.0, 0.25)] {
                 let path = machine.path(&machine.start(), &turns, dwell);
                 let study = along(&setting, path).unwrap();
                 let mut legs = Legs::new(machine, &study).unwrap();

@@ -6,7 +6,7 @@ use std::ops::Range;
 use nalgebra::Matrix3;
 
 use super::turn::{Place, Turn, radians};
-use crate::attitude::exp;
+use crate::attitude::{exp, log};
 use crate::turntable::{AxesStep, BodyStep, Moves, Path, Profile, Rotation, Table};
 use crate::units::DEGREE;
 
@@ -20,6 +20,10 @@ const RATES_BY_HAND: [i32; 2] = [45, 75];
 const START_AND_END: f64 = 1.0;
 /// Angular acceleration of a turn by hand, °/s².
 const BY_HAND: f64 = 90.0;
+/// Part of a turn after which the instrument must have turned by more than an angle in rad; this part of a number of full
+/// turns is not a full turn.
+const PART: f64 = 0.37;
+const SEEN: f64 = 10.0 * DEGREE;
 /// Turns between attitudes, in degrees: between faces, edges and corners of a cube.
 const BETWEEN: [i32; 5] = [45, -45, 90, -90, 180];
 /// Full turns, in degrees.
@@ -50,6 +54,27 @@ impl Machine<'_> {
             }
             Place::Hand(attitude) => Place::Hand(attitude * exp(turn.vector())),
         }
+    }
+
+    /// Whether every turn of a path turns the instrument: turns of two parallel table axes may cancel.
+    pub fn are_seen(&self, turns: &[Turn]) -> bool {
+        let mut place = self.start();
+        turns.iter().all(|turn| {
+            let from = place.clone();
+            place = self.after(&from, turn);
+            let (Self::Table(table), Place::Table(angles)) = (self, &from) else {
+                return true;
+            };
+            let attitude = |part: f64| {
+                let axes = table.axes.iter().zip(angles).zip(&turn.degrees);
+                let each = axes.map(|((axis, &from), &by)| {
+                    let angle = f64::from(from) + part * f64::from(by);
+                    exp(axis.direction * (angle * DEGREE))
+                });
+                each.product::<Matrix3<f64>>()
+            };
+            log(&(attitude(0.0).transpose() * attitude(PART))).norm() > SEEN
+        })
     }
 
     /// Every turn that a path may have next.
@@ -205,6 +230,7 @@ mod tests {
             turns.iter().fold(machine.start(), place).key()
         };
         for turn in &all {
+            assert!(machine.are_seen(std::slice::from_ref(turn)), "{turn:?}");
             for at in 0..5 {
                 let other = machine.spliced(&path, at..at + 1, std::slice::from_ref(turn));
                 assert_eq!(end(&other), end(&path), "{at} {turn:?}");
@@ -213,5 +239,21 @@ mod tests {
                 assert!({ slow }.all(|turn| turn.rate <= 60));
             }
         }
+    }
+    /// The outer and the inner axis are parallel, and antiparallel after half a turn of the middle axis.
+    #[test]
+    fn turns_of_parallel_axes_that_cancel_are_not_seen() {
+        let (mut table, _) = turntable("three-axis", &From::Embedded).unwrap();
+        table.axes[2].direction = nalgebra::Vector3::z();
+        let machine = Machine::Table(&table);
+        let turn = |degrees: [i32; 3]| Turn {
+            degrees: degrees.to_vec(),
+            rate: 30,
+        };
+        let flipped = |degrees| machine.are_seen(&[turn([0, 180, 0]), turn(degrees)]);
+        assert!(
+            !machine.are_seen(&[turn([360, 0, -360])]) && machine.are_seen(&[turn([360, 0, 360])])
+        );
+        assert!(!flipped([45, 0, 45]) && flipped([45, 0, -45]) && flipped([45, 0, 90]));
     }
 }

@@ -1,5 +1,7 @@
 //! Search for a path: turns are added one by one, then exchanged.
 
+use std::slice::from_ref;
+
 use rayon::prelude::*;
 
 use super::goal::Goals;
@@ -69,7 +71,7 @@ impl<'a, 'm> Search<'a, 'm> {
             next.retain(|turn| self.legs.machine.duration(turn) <= left);
             let longer = next
                 .iter()
-                .map(|turn| [&turns[..], &[turn.clone()]].concat());
+                .map(|turn| [&turns[..], from_ref(turn)].concat());
             let longer: Vec<Vec<Turn>> = longer.collect();
             let before = self.goals.distance(&now);
             let loss_per_second = |search: &Self, path: &[Turn]| {
@@ -100,10 +102,10 @@ impl<'a, 'm> Search<'a, 'm> {
             let costs = self.each(&changed, Self::cost)?;
             at += 1;
             unchanged += 1;
-            if let Some(best) = best(costs.iter().copied()) {
-                if let Some(lower) = costs[best].filter(|of| *of < (1.0 - WORTH) * cost) {
-                    (turns, cost, unchanged) = (changed[best].clone(), lower, 0);
-                }
+            let best = best(costs.iter().copied());
+            let lower = best.and_then(|best| Some((best, costs[best]?)));
+            if let Some((best, lower)) = lower.filter(|of| of.1 < (1.0 - WORTH) * cost) {
+                (turns, cost, unchanged) = (changed[best].clone(), lower, 0);
             }
         }
         Ok(turns)
@@ -121,7 +123,7 @@ impl<'a, 'm> Search<'a, 'm> {
         let machine = &self.legs.machine;
         let mut changed = Vec::new();
         for turn in machine.turns() {
-            changed.push(machine.spliced(turns, at..at, &[turn.clone()]));
+            changed.push(machine.spliced(turns, at..at, from_ref(&turn)));
             if at < turns.len() && turns[at] != turn {
                 changed.push(machine.spliced(turns, at..at + 1, &[turn]));
             }
@@ -132,7 +134,10 @@ impl<'a, 'm> Search<'a, 'm> {
         if let [one, other, ..] = &turns[at..] {
             changed.push(machine.spliced(turns, at..at + 2, &[other.clone(), one.clone()]));
         }
-        changed.retain(|path| path.len() <= MOST_TURNS && self.dwell(path) >= SHORTEST_DWELL);
+        changed.retain(|path| {
+            let is_short = path.len() <= MOST_TURNS && self.dwell(path) >= SHORTEST_DWELL;
+            is_short && machine.are_seen(path)
+        });
         changed
     }
 
