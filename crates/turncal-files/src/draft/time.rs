@@ -84,37 +84,14 @@ impl Clock {
                 "a counter shared with other packets cannot serve as a time",
             );
         }
-        let second = |word: &str| units_of_time().find(|of| of.0 == word);
-        let named = (name.unit).and_then(|unit| Some(unit.times * second(unit.word)?.1));
-        let tick = name.tick().map(|tick| tick * steps.mean);
-        let known = stated.or(tick.filter(|period| PERIODS.contains(period)));
-        // Spreadsheets count days.
-        let seconds = || units_of_time().map(|(_, second)| second).chain([DAY]);
-        let usual = rounded(steps.mean, 6);
-        let mut sigma = 0.0;
-        let (second, why) = if columns.nanoseconds.is_some() {
-            (Some(1.0), "seconds and nanoseconds".to_owned())
-        } else if named.is_some() {
-            (named, "stated in the file".to_owned())
-        } else if (steps.is_count || name.is_counter()) && name.is_time() < 2 {
-            (None, "steps of one, as in a sample counter".to_owned())
-        } else if let Some((second, period)) = known.and_then(|period| {
-            let is_near = |second: &f64| (steps.mean * second / period).ln().abs() < STATED.ln();
-            // Ticks of the log's own clock.
-            let own = || steps.is_whole.then(|| period / steps.mean);
-            let tick = name.tick().filter(is_near);
-            let known = seconds().find(is_near).or(tick);
-            sigma = if known.is_some() { 0.0 } else { RATE_SIGMA };
-            Some((known.or_else(own)?, period))
-        }) {
-            let rate = rounded(period.recip(), 6);
-            (Some(second), format!("steps of {usual} at {rate} Hz"))
-        } else {
-            let is_usual = |second: &f64| PERIODS.contains(&(steps.mean * second));
-            let likely = seconds().find(is_usual).unwrap_or(1.0);
-            (Some(likely), format!("steps of {usual}"))
-        };
-        let is_open = named.is_none() && known.is_none() && name.is_in_ticks();
+        let Tick {
+            second,
+            is_named,
+            is_known,
+            why,
+            sigma,
+        } = Tick::of(&name, &steps, stated, columns.nanoseconds.is_some());
+        let is_open = !is_named && !is_known && name.is_in_ticks();
         let doubt_of_ticks = is_open.then(|| {
             format!(
                 "The length of a tick in the column `{}` is not stated. turncal assumed the most usual one. State --rate.",
@@ -127,9 +104,10 @@ impl Clock {
                 Some((word, _)) => word.to_owned(),
                 None => format!("{:?}", rounded(second, 7)),
             }),
-            certainty: match named {
-                Some(_) if columns.nanoseconds.is_none() => Certainty::Certain,
-                _ => Certainty::Guess,
+            certainty: if is_named && columns.nanoseconds.is_none() {
+                Certainty::Certain
+            } else {
+                Certainty::Guess
             },
             why,
             period: second.map(|second| steps.mean * second).or(stated),
@@ -228,6 +206,62 @@ impl Clock {
             step: None,
             sigma: period.map_or(0.0, |_| RATE_SIGMA),
             doubt: None,
+        }
+    }
+}
+
+/// Length of a tick of the time column.
+struct Tick {
+    /// s, unless the column is a counter.
+    second: Option<f64>,
+    /// Whether the file states it.
+    is_named: bool,
+    /// Whether another statement gives the period.
+    is_known: bool,
+    why: String,
+    /// Relative 1σ of the period.
+    sigma: f64,
+}
+
+impl Tick {
+    /// The tick that the name of the column states, that agrees with the stated period, or that is usual.
+    fn of(name: &Name, steps: &Steps, stated: Option<f64>, is_split: bool) -> Self {
+        let second = |word: &str| units_of_time().find(|of| of.0 == word);
+        let named = (name.unit).and_then(|unit| Some(unit.times * second(unit.word)?.1));
+        let tick = name.tick().map(|tick| tick * steps.mean);
+        let known = stated.or(tick.filter(|period| PERIODS.contains(period)));
+        // Spreadsheets count days.
+        let seconds = || units_of_time().map(|(_, second)| second).chain([DAY]);
+        let usual = rounded(steps.mean, 6);
+        let mut sigma = 0.0;
+        let (second, why) = if is_split {
+            (Some(1.0), "seconds and nanoseconds".to_owned())
+        } else if named.is_some() {
+            (named, "stated in the file".to_owned())
+        } else if (steps.is_count || name.is_counter()) && name.is_time() < 2 {
+            (None, "steps of one, as in a sample counter".to_owned())
+        } else if let Some((second, period)) = known.and_then(|period| {
+            let is_near = |second: &f64| (steps.mean * second / period).ln().abs() < STATED.ln();
+            // Ticks of the log's own clock.
+            let own = || steps.is_whole.then(|| period / steps.mean);
+            let tick = name.tick().filter(is_near);
+            let known = seconds().find(is_near).or(tick);
+            sigma = if known.is_some() { 0.0 } else { RATE_SIGMA };
+            Some((known.or_else(own)?, period))
+        }) {
+            let rate = rounded(period.recip(), 6);
+            (Some(second), format!("steps of {usual} at {rate} Hz"))
+        } else {
+            let is_usual = |second: &f64| PERIODS.contains(&(steps.mean * second));
+            let likely = seconds().find(is_usual).unwrap_or(1.0);
+            (Some(likely), format!("steps of {usual}"))
+        };
+        Self {
+            second,
+            is_named: named.is_some(),
+            is_known: known.is_some(),
+            why,
+            sigma,
         }
     }
 }

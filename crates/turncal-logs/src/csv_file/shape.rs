@@ -269,26 +269,11 @@ impl Labelled {
             .filter(|line| has_decimal_comma(&line.text))
             .count()
             > count;
-        let mut section = Section::default();
-        let marked = lines.clone().map(|line| section.marked(&line.text, comma));
-        let mut kinds: Vec<Kind> = Vec::new();
-        let mut places = HashMap::new();
-        // Indices of the kinds of all lines with numbers.
-        let mut order = Vec::new();
-        let mut between = HashMap::new();
-        for line in marked {
-            // An item of a list has no name.
-            if line.marks.is_empty() || line.shape.starts_with(b"- ") {
-                *between.entry(line.shape).or_insert(0) += 1;
-                continue;
-            }
-            let place = *places.entry(line.shape.clone()).or_insert(kinds.len());
-            if place == kinds.len() {
-                kinds.push(Kind::of(&line));
-            }
-            kinds[place].add(&line);
-            order.push(place);
-        }
+        let Shapes {
+            kinds,
+            mut order,
+            mut between,
+        } = Shapes::of(lines.clone(), comma);
         let least = FEWEST.max(count / RARE);
         let is_stream = |place: &usize| kinds[*place].count >= least;
         let streams = kinds.iter().filter(|kind| kind.count >= least);
@@ -350,6 +335,42 @@ impl Labelled {
     fn knows(&self, shape: &Vec<u8>) -> bool {
         let mut streams = self.streams.iter();
         streams.any(|stream| stream.shapes.contains(shape)) || self.between.contains(shape)
+    }
+}
+
+/// The shapes of lines.
+struct Shapes {
+    kinds: Vec<Kind>,
+    /// Indices of the kinds of all lines with numbers.
+    order: Vec<usize>,
+    /// Number of lines of each shape that has no values.
+    between: HashMap<Vec<u8>, usize>,
+}
+
+impl Shapes {
+    fn of<'a>(lines: impl Iterator<Item = &'a Line>, comma: bool) -> Self {
+        let (mut kinds, mut order) = (Vec::<Kind>::new(), Vec::new());
+        let (mut places, mut between) = (HashMap::new(), HashMap::new());
+        let mut section = Section::default();
+        for line in lines {
+            let line = section.marked(&line.text, comma);
+            // An item of a list has no name.
+            if line.marks.is_empty() || line.shape.starts_with(b"- ") {
+                *between.entry(line.shape).or_insert(0) += 1;
+                continue;
+            }
+            let place = *places.entry(line.shape.clone()).or_insert(kinds.len());
+            if place == kinds.len() {
+                kinds.push(Kind::of(&line));
+            }
+            kinds[place].add(&line);
+            order.push(place);
+        }
+        Self {
+            kinds,
+            order,
+            between,
+        }
     }
 }
 
