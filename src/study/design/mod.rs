@@ -74,6 +74,7 @@ impl DesignStudy {
         } else {
             Machine::Table(&table)
         };
+        machine.check().map_err(PathError::Words)?;
         let is_limited = self.specification.is_some();
         let usual = if is_limited { LONGEST } else { USUAL_TIME };
         let time = self.time.unwrap_or(usual);
