@@ -256,7 +256,12 @@ mod tests {
 
     /// An accelerometer with 2000 counts/s per m/s², a bias of 4 counts/s and q of second order and cross-coupling.
     fn calibration() -> Calibration {
-        let mut calibration = Calibration::default();
+        let estimated = ["accel.bias.x", "accel.installation.zx"];
+        let mut calibration = Calibration {
+            sigma: Some(Default::default()),
+            parameters: estimated.map(str::to_owned).into(),
+            ..Calibration::default()
+        };
         for triad in [&mut calibration.gyro, &mut calibration.accel] {
             (triad.scale, triad.bias) = ([2000.0; 3], [4.0, 0.0, 0.0]);
         }
