@@ -16,9 +16,15 @@ enum Convert {
 }
 use Convert::{ByScale, Inverse, Times};
 
-/// A term: symbol, parameter, conversion, unit and definition. In the last part of the parameter's name, `i` is the input
-/// axis, and `p` and `o` are the two next axes in the order x, y, z, x.
-type Entry = (&'static str, &'static str, Convert, String, &'static str);
+/// A term. In the last part of the parameter's name, `i` is the input axis, and `p` and `o` are the two next axes in the
+/// order x, y, z, x.
+struct Entry {
+    symbol: &'static str,
+    parameter: &'static str,
+    convert: Convert,
+    unit: String,
+    definition: &'static str,
+}
 
 const G: f64 = STANDARD_GRAVITY;
 
@@ -45,80 +51,58 @@ pub fn table(calibration: &Calibration) -> Table {
     )
 }
 
+fn entry(
+    symbol: &'static str,
+    parameter: &'static str,
+    (convert, unit): (Convert, &str),
+    definition: &'static str,
+) -> Entry {
+    Entry {
+        symbol,
+        parameter,
+        convert,
+        unit: unit.to_owned(),
+        definition,
+    }
+}
+
 fn accel(calibration: &Calibration) -> Vec<Entry> {
     let per_g = match unit(calibration, Sensor::Accel) {
         (unit, true) => format!("{unit} per g"),
         (unit, false) => format!("{unit}/s per g"),
     };
-    let micro = |power: i32| {
-        (
-            Times(G.powi(power) / MICRO_G),
-            format!("µg/g{}", raised(power)),
-        )
-    };
-    let ((second, of_second), (third, of_third)) = (micro(2), micro(3));
-    let coupling =
-        |symbol, parameter, definition| (symbol, parameter, second, of_second.clone(), definition);
-    let arcsec = || "″".to_owned();
+    let (second, third) = (
+        (Times(G.powi(2) / MICRO_G), "µg/g²"),
+        (Times(G.powi(3) / MICRO_G), "µg/g³"),
+    );
+    let arcsec = |sign: f64| (Times(sign / ARCSEC), "″");
+    let (ppm, bias) = ((Times(2.0 / PPM), "ppm"), (ByScale(MICRO_G), "µg"));
+    let (of_o, of_p) = (
+        "misalignment about o: E to p",
+        "misalignment about p: −E to o",
+    );
+    let coupling = "cross-coupling: q";
     vec![
-        (
+        entry(
             "accel K₁",
             "accel.scale.i",
-            Times(G),
-            per_g,
+            (Times(G), &per_g),
             "scale factor: K × 1 g",
         ),
-        (
-            "accel K₀",
-            "accel.bias.i",
-            ByScale(MICRO_G),
-            "µg".to_owned(),
-            "bias: D / K",
+        entry("accel K₀", "accel.bias.i", bias, "bias: D / K"),
+        entry("accel K₁′", "accel.asymmetry.i", ppm, "asymmetry: 2 q"),
+        entry(
+            "accel K₂",
+            "accel.second_order.i",
+            second,
+            "second order: q",
         ),
-        (
-            "accel K₁′",
-            "accel.asymmetry.i",
-            Times(2.0 / PPM),
-            "ppm".to_owned(),
-            "asymmetry: 2 q",
-        ),
-        coupling("accel K₂", "accel.second_order.i", "second order: q"),
-        (
-            "accel K₃",
-            "accel.third_order.i",
-            third,
-            of_third,
-            "third order: q",
-        ),
-        coupling(
-            "accel K_ip",
-            "accel.cross_coupling.i.ip",
-            "cross-coupling: q",
-        ),
-        coupling(
-            "accel K_io",
-            "accel.cross_coupling.i.io",
-            "cross-coupling: q",
-        ),
-        coupling(
-            "accel K_po",
-            "accel.cross_coupling.i.po",
-            "cross-coupling: q",
-        ),
-        (
-            "accel δ_o",
-            "accel.installation.ip",
-            Times(1.0 / ARCSEC),
-            arcsec(),
-            "misalignment about o: E to p",
-        ),
-        (
-            "accel δ_p",
-            "accel.installation.io",
-            Times(-1.0 / ARCSEC),
-            arcsec(),
-            "misalignment about p: −E to o",
-        ),
+        entry("accel K₃", "accel.third_order.i", third, "third order: q"),
+        entry("accel K_ip", "accel.cross_coupling.i.ip", second, coupling),
+        entry("accel K_io", "accel.cross_coupling.i.io", second, coupling),
+        entry("accel K_po", "accel.cross_coupling.i.po", second, coupling),
+        entry("accel δ_o", "accel.installation.ip", arcsec(1.0), of_o),
+        entry("accel δ_p", "accel.installation.io", arcsec(-1.0), of_p),
     ]
 }
 
@@ -129,108 +113,71 @@ fn gyro(calibration: &Calibration) -> Vec<Entry> {
         (unit, true) => (1.0, format!("rad/s per {unit}")),
         (unit, false) => (1.0, format!("rad per {unit}")),
     };
-    let ppm = |times: f64| Times(times / PPM);
-    let at = || "ppm at 100 °/s".to_owned();
-    let per_g = |power: i32| {
-        let unit = format!("°/h/g{}", raised(power));
-        (Times(G.powi(power) / DEG_PER_H), unit)
-    };
-    let ((first, of_first), (second, of_second)) = (per_g(1), per_g(2));
-    let drift =
-        |symbol, parameter, definition| (symbol, parameter, first, of_first.clone(), definition);
-    let turned = |symbol, parameter, definition| {
-        (
-            symbol,
-            parameter,
-            Times(1.0 / ARCSEC),
-            "″".to_owned(),
-            definition,
-        )
-    };
+    let (scale, bias) = ((Inverse(size), scale.as_str()), (ByScale(DEG_PER_H), "°/h"));
+    let ppm = (Times(-2.0 / PPM), "ppm");
+    let [twice, once] = [-2.0, -1.0].map(|by| (Times(by / PPM), "ppm at 100 °/s"));
+    let first = (Times(G / DEG_PER_H), "°/h/g");
+    let second = (Times(G.powi(2) / DEG_PER_H), "°/h/g²");
+    let arcsec = (Times(1.0 / ARCSEC), "″");
+    let by_rate = "(S₊ − S₋) / S, proportional to rate: −2 q";
+    let [linear, square] = [
+        "change of S, proportional to |rate|: −q",
+        "change of S, proportional to rate²: −q",
+    ];
     vec![
-        (
-            "gyro S",
-            "gyro.scale.i",
-            Inverse(size),
-            scale,
-            "scale factor: 1 / K",
-        ),
-        (
-            "gyro D_F",
-            "gyro.bias.i",
-            ByScale(DEG_PER_H),
-            "°/h".to_owned(),
-            "bias: D / K",
-        ),
-        (
+        entry("gyro S", "gyro.scale.i", scale, "scale factor: 1 / K"),
+        entry("gyro D_F", "gyro.bias.i", bias, "bias: D / K"),
+        entry(
             "gyro asymmetry",
             "gyro.asymmetry.i",
-            ppm(-2.0),
-            "ppm".to_owned(),
+            ppm,
             "(S₊ − S₋) / S: −2 q",
         ),
-        (
+        entry(
             "gyro asymmetry by rate",
             "gyro.second_order.i",
-            ppm(-2.0),
-            at(),
-            "(S₊ − S₋) / S, proportional to rate: −2 q",
+            twice,
+            by_rate,
         ),
-        (
-            "gyro nonlinearity",
-            "gyro.odd_quadratic.i",
-            ppm(-1.0),
-            at(),
-            "change of S, proportional to |rate|: −q",
-        ),
-        (
-            "gyro nonlinearity",
-            "gyro.third_order.i",
-            ppm(-1.0),
-            at(),
-            "change of S, proportional to rate²: −q",
-        ),
-        turned(
+        entry("gyro nonlinearity", "gyro.odd_quadratic.i", once, linear),
+        entry("gyro nonlinearity", "gyro.third_order.i", once, square),
+        entry(
             "gyro Γ_p",
             "gyro.installation.ip",
+            arcsec,
             "input axis turned towards p: E to p",
         ),
-        turned(
+        entry(
             "gyro Γ_o",
             "gyro.installation.io",
+            arcsec,
             "input axis turned towards o: E to o",
         ),
-        drift(
+        entry(
             "gyro D_I",
             "gyro.g_sensitivity.ii",
+            first,
             "drift per g along i: q",
         ),
-        drift(
+        entry(
             "gyro D_p",
             "gyro.g_sensitivity.ip",
+            first,
             "drift per g along p: q",
         ),
-        drift(
+        entry(
             "gyro D_o",
             "gyro.g_sensitivity.io",
+            first,
             "drift per g along o: q",
         ),
-        (
+        entry(
             "gyro D_II",
             "gyro.g2_sensitivity.i",
             second,
-            of_second,
             "drift per g² along i: q",
         ),
     ]
-}
-
-fn raised(power: i32) -> &'static str {
-    match power {
-        2 => "²",
-        3 => "³",
-        _ => "",
-    }
 }
 
 /// Unit of the file, and whether rows are rates.
@@ -241,15 +188,12 @@ fn unit(calibration: &Calibration, sensor: Sensor) -> (&str, bool) {
 }
 
 /// The values of all axes; `None` if the calibration has none.
-fn row(
-    calibration: &Calibration,
-    (symbol, parameter, convert, unit, definition): &Entry,
-) -> Option<Vec<String>> {
-    let values = [0, 1, 2].map(|axis| value_of(calibration, parameter, *convert, axis));
+fn row(calibration: &Calibration, entry: &Entry) -> Option<Vec<String>> {
+    let of_axis = |axis| value_of(calibration, entry.parameter, entry.convert, axis);
+    let values = [0, 1, 2].map(of_axis);
     values.iter().any(Option::is_some).then(|| {
-        let values = values.map(|value| value.unwrap_or_else(|| NONE.to_owned()));
-        let [x, y, z] = values;
-        cells![*symbol, x, y, z, unit.as_str(), *definition]
+        let [x, y, z] = values.map(|value| value.unwrap_or_else(|| NONE.to_owned()));
+        cells![entry.symbol, x, y, z, entry.unit.as_str(), entry.definition]
     })
 }
 
@@ -312,7 +256,12 @@ mod tests {
 
     /// An accelerometer with 2000 counts/s per m/s², a bias of 4 counts/s and q of second order and cross-coupling.
     fn calibration() -> Calibration {
-        let mut calibration = Calibration::default();
+        let estimated = ["accel.bias.x", "accel.installation.zx"];
+        let mut calibration = Calibration {
+            sigma: Some(Default::default()),
+            parameters: estimated.map(str::to_owned).into(),
+            ..Calibration::default()
+        };
         for triad in [&mut calibration.gyro, &mut calibration.accel] {
             (triad.scale, triad.bias) = ([2000.0; 3], [4.0, 0.0, 0.0]);
         }

@@ -2,11 +2,12 @@
 
 use rayon::prelude::*;
 
+use super::expected::{along, expected};
 use super::goal::Goals;
 use super::legs::Legs;
 use super::search::{SHORTEST_DWELL, Search};
 use super::turn::Turn;
-use super::{DesignStudy, TURN, USUAL_TIME, along, expected};
+use super::{DesignStudy, TURN, USUAL_TIME};
 use crate::calibration::Estimate;
 use crate::study::path::PathError;
 

@@ -109,7 +109,7 @@ impl<'a> Legs<'a> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{along, expected};
+    use super::super::expected::{along, expected};
     use super::*;
     use crate::calibration::Group;
     use crate::study::path::Named;

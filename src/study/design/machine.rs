@@ -37,6 +37,22 @@ pub enum Machine<'a> {
 }
 
 impl Machine<'_> {
+    /// An error if an axis is too slow for turns at whole degrees per second.
+    pub fn check(&self) -> Result<(), String> {
+        let Self::Table(table) = self else {
+            return Ok(());
+        };
+        let slow = table.axes.iter().find(|axis| axis.max_rate < DEGREE);
+        slow.map_or(Ok(()), |axis| {
+            Err(format!(
+                "axis {} of the table: found max_rate_deg_per_s = {}, expected 1 or more. State this axis without \
+                 its turns, as part of mount_deg.",
+                axis.name,
+                axis.max_rate / DEGREE
+            ))
+        })
+    }
+
     /// The first attitude.
     pub fn start(&self) -> Place {
         match self {

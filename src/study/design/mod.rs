@@ -5,6 +5,7 @@
 //! joined, so that a path takes a millisecond.
 
 mod choice;
+mod expected;
 mod goal;
 mod legs;
 mod machine;
@@ -14,9 +15,9 @@ mod text;
 mod turn;
 
 use super::path::{Evaluation, PathError, PathStudy};
-use crate::calibration::{CalibrationError, Estimate, Journey, Leg, Problem, coarse_start};
+use crate::calibration::Estimate;
 use crate::lot::Specification;
-use crate::turntable::Path;
+use expected::{along, expected};
 use goal::Goals;
 use legs::Legs;
 use machine::Machine;
@@ -74,6 +75,7 @@ impl DesignStudy {
         } else {
             Machine::Table(&table)
         };
+        machine.check().map_err(PathError::Words)?;
         let is_limited = self.specification.is_some();
         let usual = if is_limited { LONGEST } else { USUAL_TIME };
         let time = self.time.unwrap_or(usual);
@@ -130,28 +132,4 @@ impl DesignStudy {
             terms.join(", ")
         )
     }
-}
-
-/// The setting along a path.
-fn along(setting: &PathStudy, path: Path) -> Result<PathStudy, PathError> {
-    let scenario = setting.scenario.clone().along(path, "designed");
-    Ok(PathStudy {
-        scenario: scenario.map_err(PathError::Words)?,
-        ..setting.clone()
-    })
-}
-
-/// Expected σ of a path; with automatic terms, if every term that may be absent has its usual size.
-fn expected(study: &PathStudy) -> Result<Estimate, PathError> {
-    let (run, truth, terms) = study.record()?;
-    let problem = Problem::new(&run, &study.options);
-    let start = coarse_start(&problem)?.attitudes;
-    let at = (&truth, &terms);
-    let mut journey = Journey::new(&problem, at);
-    for leg in Leg::all(&problem, at, &start)? {
-        journey.go(&leg, 1.0)?;
-    }
-    let duration = run.recording.imu.duration();
-    let undetermined = CalibrationError::Diverged { time: duration };
-    Ok(journey.estimate(&truth).ok_or(undetermined)?)
 }

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::expected;
+use super::expected::expected;
 use crate::calibration::Estimate;
 use crate::models::{self, Place, Room};
 use crate::study::path::{PathError, PathStudy};

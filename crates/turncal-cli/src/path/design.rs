@@ -5,8 +5,7 @@ use std::time::Duration;
 
 use anyhow::{Context, bail};
 
-use super::Setting;
-use super::undecided;
+use super::setting::{Setting, undecided};
 use crate::arguments::{With, keep, seconds};
 use crate::terminal::{Activity, show};
 use turncal::study::design::{DesignStudy, SHORTEST};

@@ -8,16 +8,13 @@ use std::path::Path;
 use anyhow::Context;
 use clap::Subcommand;
 
-use crate::NotMet;
 use crate::arguments::{Delivery, OfLog, With};
 use crate::terminal::Activity;
 use design::Design;
-use setting::Setting;
-use turncal::calibration::Word;
+use setting::{Setting, undecided};
 use turncal::study::path::{Evaluation, PathStudy};
 use turncal_files::Opened;
 use turncal_input::small_file;
-use turncal_report::Document;
 use turncal_report::path::{Report, in_words, moves_in_words};
 
 /// Predicts calibration accuracy for a path, or designs a path, before any data exist
@@ -114,16 +111,6 @@ impl Evaluate {
         let moves = moves_in_words(&study.scenario);
         let evaluation = study.evaluate().with_context(|| format!("path {name}"))?;
         Ok((name, in_words(&study), moves, evaluation))
-    }
-}
-
-/// The exit status of a specification that cannot be decided.
-fn undecided(name: &str, document: &Document) -> anyhow::Result<()> {
-    match &document.verdict {
-        Some((Word::Undecided, text)) => {
-            Err(NotMet::Specification(format!("{name}: {text}")).into())
-        }
-        _ => Ok(()),
     }
 }
 

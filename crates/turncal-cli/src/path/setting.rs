@@ -2,11 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::NotMet;
 use crate::arguments::{AIDINGS, With, needs_table, one_of, with_value};
+use turncal::calibration::Word;
 use turncal::lot::Specification;
 use turncal::models::{ModelError, specification};
 use turncal::run::Aiding;
 use turncal::study::path::Named;
+use turncal_report::Document;
 
 /// Options of all path commands.
 #[derive(Debug, clap::Args)]
@@ -65,5 +68,15 @@ impl Setting {
             .into_iter()
             .flatten();
         names.map(Path::new).chain(self.specification.as_deref())
+    }
+}
+
+/// The exit status of a specification that cannot be decided.
+pub fn undecided(name: &str, document: &Document) -> anyhow::Result<()> {
+    match &document.verdict {
+        Some((Word::Undecided, text)) => {
+            Err(NotMet::Specification(format!("{name}: {text}")).into())
+        }
+        _ => Ok(()),
     }
 }
