@@ -24,7 +24,7 @@ pub struct Options {
     pub aiding: Option<Aiding>,
     /// Error terms to estimate in addition to those with a σ stated for instrument or table.
     pub terms: Vec<ErrorTerm>,
-    /// Whether the estimate is averaged over the absence and the usual sizes of all other error terms.
+    /// Whether the estimate is averaged over the absence and the typical magnitudes of all other error terms.
     pub auto_terms: bool,
     /// Noise policy.
     pub noise: NoisePolicy,

@@ -275,7 +275,7 @@ pub struct BlockRecord {
     /// Probability that the term is present.
     #[serde(default)]
     pub present: f64,
-    /// Largest remaining part of the usual size of the term, from 0 (known) to 1 (not shown).
+    /// Largest remaining part of the typical magnitude of the term, from 0 (known) to 1 (not shown).
     #[serde(default)]
     pub remaining: f64,
     /// σ with the term divided by σ without the term, for gyro K, E, D and accel K, E, D; `None` if there is no σ.

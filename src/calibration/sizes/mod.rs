@@ -35,7 +35,7 @@ const SETTLED: f64 = 0.1;
 #[derive(Debug, Clone, Copy)]
 struct Size {
     usual: Usual,
-    /// Log of the size over the usual size, and its 1σ.
+    /// Log of the size over the typical magnitude, and its 1σ.
     log: f64,
     sigma: f64,
 }
@@ -269,7 +269,7 @@ impl Effects {
         })
     }
 
-    /// Sets the noise at rest in a model, and all other effects to these logs over their usual sizes.
+    /// Sets the noise at rest in a model, and all other effects to these logs over their typical magnitudes.
     fn set(&self, model: &mut Model, log: impl Fn(&Size) -> f64) {
         self.at_rest
             .iter()

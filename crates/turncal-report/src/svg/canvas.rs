@@ -185,7 +185,7 @@ impl Canvas {
         self.put(Circle::new(place(at), px(radius), style));
     }
 
-    /// Writes text so that the point is at the given position within the text; a `scale` of 1 is the usual size.
+    /// Writes text so that the point is at the given position within the text; a `scale` of 1 is the normal size.
     pub fn text(
         &mut self,
         text: &str,

@@ -116,8 +116,8 @@ kinds! {
         "The results apply only together with the error terms listed in this certificate."
     Settling = "W15" "settling" Note:
         "After stops, the attitude differs from the reading of the table by an angle that fades within seconds. \
-         turncal estimated the usual size of this angle, and the σ include this error. Wait longer after each stop, or \
-         state settling_sigma_arcsec in [turntable]."
+         turncal estimated the typical magnitude of this angle, and the σ include this error. Wait longer after each \
+         stop, or state settling_sigma_arcsec in [turntable]."
         "The turntable settled for some seconds after its moves; U includes the effect."
     PositionWrong = "W16" "position-wrong" Care:
         "The table attitude in one dwell contradicts the gyros and accelerometers. turncal gave the readings of this \
@@ -202,9 +202,9 @@ kinds! {
         "The instrument slipped on the turntable; the misalignments apply to the mounting before the slip."
     TermNotShown = "W34" "term-not-shown" Note:
         "This recording cannot show an error term that instruments of this class may have, and K, E or D depend on the \
-         term. The σ include the usual size of this term. Add the moves listed in the finding, or state in \
+         term. The σ include the typical magnitude of this term. Add the moves listed in the finding, or state in \
          [imu.terms] that the instrument does not have the term: sigma = 0. `--with none` leaves out all terms."
-        "U includes the usual size of error terms that the recorded data cannot show."
+        "U includes the typical magnitude of error terms that the recorded data cannot show."
 }
 
 impl Kind {
