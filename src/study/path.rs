@@ -31,9 +31,9 @@ pub struct Named<'a> {
     pub path: &'a str,
     /// The scenario; `None` for the default scenario.
     pub scenario: Option<&'a str>,
-    /// Instrument that replaces the instrument of the scenario.
+    /// Instrument to use instead of the one in the scenario.
     pub imu: Option<&'a str>,
-    /// Table that replaces the table of the scenario.
+    /// Table to use instead of the one in the scenario.
     pub table: Option<&'a str>,
     /// Observations used by the filter. `None` means the table or, for moves by hand, velocity.
     pub aiding: Option<Aiding>,
@@ -87,7 +87,7 @@ pub enum PathError {
     /// A model cannot be read.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// The words are not moves.
+    /// The path is neither a model nor a valid list of moves.
     #[error("{0}")]
     Words(String),
     /// The table cannot follow the path.

@@ -9,7 +9,7 @@ use turncal_input::{FileColumn, FileError, Place};
 
 /// A file that provides rows of numbers in sequence.
 pub trait Rows {
-    /// The file name used in errors.
+    /// The file name shown in error messages.
     fn file(&self) -> &Path;
 
     /// The names of the columns.

@@ -250,8 +250,8 @@ impl Effects {
         anew.weighed(chain, problem, script)
     }
 
-    /// Variances, divided by the variances with which the links of a chain are made; with stated noise, slips are
-    /// excluded.
+    /// Variance of each effect, relative to the variance that was assumed when the links of the chain were made. If the
+    /// noise is stated, slips are excluded.
     pub fn sizes(&self, chain: &Chain) -> Sizes {
         if self.at_rest.is_empty() && self.between.is_empty() {
             let slips = chain.states.slips.is_some();

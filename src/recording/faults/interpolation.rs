@@ -7,8 +7,8 @@ use std::ops::Range;
 
 use fill::{Fill, MOST};
 
-/// Polynomials tried: degree, and samples used from either side. Each further polynomial must agree with the best one
-/// so far at the gap itself, because its test stretches are farther away.
+/// Polynomials tried: degree, and samples used from each side. Each further polynomial must agree with the best one so
+/// far at the gap itself, because its test stretches are farther away.
 const CANDIDATES: [(usize, usize); 12] = [
     (1, 1),
     (1, 2),

@@ -1,4 +1,4 @@
-//! A draft of `run.toml` for a log that has none: detected fields with reasons, and open fields for the user to
+//! A draft of `run.toml` for a log that has none: detected fields with reasons, and unknown fields for the user to
 //! complete.
 
 mod columns;

@@ -1,4 +1,4 @@
-//! The draft as the fields of `run.toml`, with reasons and open fields.
+//! The draft as the fields of `run.toml`, with reasons and with the fields that the user must complete.
 
 use std::collections::BTreeMap;
 
@@ -35,7 +35,7 @@ impl Draft {
             None => "the log alone".to_owned(),
         };
         let remark = format_args!(
-            "Draft made from {of_it}. Check the guesses and complete the open fields; then run `turncal check`."
+            "Draft made from {of_it}. Check the guesses and complete the fields marked TODO; then run `turncal check`."
         );
         remarks.before("format", remark);
         let run = RunFile {

@@ -6,9 +6,9 @@ use nalgebra::{Matrix4, Vector4};
 
 use crate::recording::faults::rows::consecutive;
 
-/// Maximum number of samples used on either side of a gap.
+/// Maximum number of samples used on each side of a gap.
 pub const MOST: usize = 64;
-/// Maximum number of intact stretches on either side for testing a fill.
+/// Maximum number of intact stretches used on each side for testing a fill.
 const TRIALS: usize = 16;
 /// Minimum number of intact stretches on both sides together for testing a fill.
 const FEWEST_TRIALS: usize = 8;
@@ -98,7 +98,7 @@ impl Fill {
         }
     }
 
-    /// Offsets at which gap and neighbours are all usable, up to [`TRIALS`] on either side.
+    /// Offsets at which gap and neighbours are all usable, up to [`TRIALS`] on each side.
     fn intact(&self, sound: &[bool]) -> Vec<isize> {
         let is_sound = |run: &Range<usize>, shift| {
             let start = run.start.checked_add_signed(shift);
