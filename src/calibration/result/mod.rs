@@ -224,7 +224,8 @@ pub struct GravityRecord {
 pub enum Method {
     /// Extended Kalman filter that uses the whole run
     Ekf,
-    /// Closed form from table positions, otherwise from labelled sections, otherwise from gravity
+    /// Closed form from table positions; without a table log, from labelled sections or, if there are none, from
+    /// gravity
     SixPosition,
 }
 

@@ -13,7 +13,7 @@ pub const ENTRY: TermEntry = TermEntry {
     name: "g2-sensitivity",
     title: "gyro g²-sensitivity",
     help: "Gyros: square of specific force",
-    adds: "q f^2 along its axis to w",
+    adds: "q f^2 to w, along its axis",
     shown_by: "long dwells with each axis up, down and level",
     sensor: Sensor::Gyro,
     unit: ("°/h/g²", DEG_PER_H / (STANDARD_GRAVITY * STANDARD_GRAVITY)),

@@ -79,7 +79,7 @@ impl Continued {
         }
         if rows.len() > 1 && rows.iter().all(|row| self.head.contains(row)) {
             bail!(
-                "{log}: found rows that this file contains already, expected new rows. Choose another file"
+                "{log}: found rows that this file already contains, expected new rows. Choose another file"
             );
         }
         Ok(())

@@ -123,7 +123,7 @@ pub struct Calibrate {
     /// there, which must not exist yet
     #[arg(long, value_name = "RUN.toml", requires = "follow", conflicts_with = "keep", value_parser = run_file, help_heading = FOLLOWING)]
     run: Option<PathBuf>,
-    /// Time in s without growth after which a followed file counts as complete
+    /// Time in s after which a followed file that has not grown counts as complete
     #[arg(long, value_name = "S", requires = "follow", value_parser = seconds, default_value = "30", help_heading = FOLLOWING)]
     patience: Duration,
     /// Print the calibration, or the evaluation of the lot, as a single JSON document, without any other output

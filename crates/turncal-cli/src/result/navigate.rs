@@ -21,7 +21,7 @@ const LARGEST_PITCH: f64 = 89.0;
 ///
 /// Simulates an instrument with the true parameters in --truth, at rest or along a trajectory. Corrects its output with
 /// the calibration, and navigates with the corrected data. Navigation starts with perfect alignment, and the height is
-/// held at the true height. Shows the errors of attitude, velocity and position, and the σ of these errors predicted
+/// fixed to its true value. Shows the errors of attitude, velocity and position, and the σ of these errors predicted
 /// from the covariance of the calibration. Without --force, turncal refuses a calibration whose verdict is FAILED.
 #[derive(Debug, clap::Args)]
 #[command(mut_arg("output", |output| output.help("Directory for navigation.csv, figures and a page")))]

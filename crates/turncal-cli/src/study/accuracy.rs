@@ -44,7 +44,8 @@ pub struct Accuracy {
     /// Misalignment form of the filter
     #[arg(long, value_parser = one_of(&FORMS), default_value = "general")]
     installation: InstallationForm,
-    /// Installation of the simulated instruments: a TOML file or an embedded name [default: from the scenario]
+    /// Misalignment of the simulated instruments: an installation file (TOML) or an embedded name [default: from the
+    /// scenario]
     #[arg(long, value_name = "MODEL")]
     truth_installation: Option<String>,
     /// Error terms to simulate and to estimate, in addition to those of the scenario [default: auto]

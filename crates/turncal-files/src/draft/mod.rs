@@ -340,7 +340,7 @@ pub fn turned_angle(triads: PerSensor<Vec<Vector3<f64>>>, period: f64) -> Option
 fn no_time(sheet: &Sheet, columns: &Columns, clock: &Clock) -> Option<[String; 3]> {
     if let Some(name) = columns::falling_time(sheet).filter(|_| columns.time.is_none()) {
         return Some([
-            format!("times in the column `{name}` that fall from row to row"),
+            format!("times in the column `{name}` that decrease from row to row"),
             "times that increase".to_owned(),
             "The newest row is first: reverse the rows below the names.".to_owned(),
         ]);

@@ -70,7 +70,7 @@ impl Draft {
             value
         };
         let (of, latitude) = (&self.stated, "north positive; 0.1° is accurate enough");
-        let gravity = "if measured; otherwise turncal uses normal gravity";
+        let gravity = "measured gravity; if this field is omitted, turncal uses normal gravity";
         SiteFile {
             latitude_deg: field("latitude_deg", of.latitude_deg, latitude).map(Latitude),
             height_m: field("height_m", of.height_m, "above the ellipsoid").map(Height),
@@ -118,7 +118,7 @@ impl Draft {
             );
         }
         remarks.reason("imu.time_unit", &clock.why);
-        let why = "guess: a row covers the interval that ends at its time stamp; otherwise \"start\" or \"middle\"";
+        let why = "guess: a row covers the interval that ends at its time stamp; if not, set \\"start\\" or \\"middle\\"";
         remarks.reason("imu.time_stamp", why);
         remarks.reason("imu.continuous", self.why_continuous());
         let why = "the log contains several instruments; this value selects the first";
@@ -208,7 +208,7 @@ impl Draft {
             return axes;
         }
         let mut why =
-            "guess: x right, y front, z up; otherwise set this field to \"frd\" or \"flu\""
+            "guess: x right, y front, z up; if not, set \\"frd\\" or \\"flu\\""
                 .to_owned();
         if is_of_autopilot(&self.columns.names) {
             why += "; the column names are those of PX4 or ArduPilot, which use \"frd\"";

@@ -73,7 +73,7 @@ impl Clock {
     pub fn find(sheet: &Sheet, columns: &mut Columns) -> Self {
         let stated = sheet.rate.map(f64::recip);
         let Some((column, stamps)) = columns.time.zip(columns.stamps(sheet)) else {
-            return Self::without(stated, "no column increases steadily, as a time does");
+            return Self::without(stated, "no column increases steadily, as time stamps do");
         };
         let steps = Steps::of(&stamps);
         let name = Name::of_column(&sheet.names[column], &sheet.units[column]);
@@ -81,7 +81,7 @@ impl Clock {
             columns.time = None;
             return Self::without(
                 stated,
-                "a counter shared with other packets cannot serve as a time",
+                "a counter shared with other packets cannot serve as a time column",
             );
         }
         let second = |word: &str| units_of_time().find(|of| of.0 == word);

@@ -35,8 +35,8 @@ pub struct RunFile {
     /// Place of the recording
     #[serde(default)]
     pub site: SiteFile,
-    /// Texts that are copied into the result: instrument, serial, operator, date, temperature_degc, laboratory,
-    /// table, notes
+    /// Strings, numbers or dates that are copied into the result: instrument, serial, operator, date, temperature_degc,
+    /// laboratory, table, notes
     #[serde(default)]
     pub meta: BTreeMap<String, String>,
     /// Log of the IMU, its units, noise and prior
@@ -92,7 +92,8 @@ pub struct ImuFile {
     pub time_unit: Option<TimeUnitField>,
     /// Time from row to row, s; default: from the time stamps
     pub sample_period_s: Option<Positive>,
-    /// 1σ of the sample period, ppm; default: 10000 without a time column and a [turntable], otherwise 0
+    /// 1σ of the sample period, ppm; default: 10000 for rates with neither a time column nor a [turntable], 0 in all
+    /// other cases
     pub sample_period_sigma_ppm: Option<NonNegative>,
     /// Whether a stamp marks the end, the start or the middle of its sample
     pub time_stamp: TimeStamp,

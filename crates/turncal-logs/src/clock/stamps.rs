@@ -422,9 +422,9 @@ impl Stamps {
             )),
             TimeUnit::Count => (missing > 0).then(|| {
                 format!(
-                    "Rows are missing, and the counter wraps every {} samples ({} s). Each gap may be longer by one \
-                     or more of these periods; all later times would then be too early by the same amount. Use a time \
-                     that does not wrap, or split the recording at the gaps.",
+                    "Rows are missing, and the counter wraps every {} samples ({} s). Each gap may be longer by one or \
+                     more of these periods; all later times would then be too early by the same amount. Use a time \
+                     column that does not wrap, or split the recording at the gaps.",
                     (size / self.period()).round(),
                     nanoseconds(size)
                 )

@@ -541,7 +541,7 @@ struct Label {
     unit: String,
     /// Axis at the end of the words.
     axis: Option<char>,
-    /// Whether the value only increases, as a time does.
+    /// Whether the value only increases, as time stamps do.
     increases: bool,
 }
 

@@ -59,8 +59,9 @@ macro_rules! kinds {
 kinds! {
     Recording = "W01" "recording" Note:
         "turncal repaired or assumed something when it read the log: for example, it bridged gaps, dropped rows, \
-         corrected an uneven clock, or assumed a location or noise figure that run.toml does not state. The σ include the effect. \
-         If the finding names a field, state this field in run.toml. `turncal check` lists all faults of a log."
+         corrected an uneven clock, or assumed a location or noise figure that run.toml does not state. The σ include \
+         the effect. If the finding names a field, set this field in run.toml. `turncal check` lists all faults of a \
+         log."
         "Before the evaluation, faults in the recorded data were repaired or missing information was assumed; U \
          includes the effect."
     NotConverged = "W02" "not-converged" Failed:
@@ -123,11 +124,11 @@ kinds! {
         "The table attitude in one dwell contradicts the gyros and accelerometers. turncal gave the readings of this \
          dwell next to no weight and used the rest. Check the table log at this time for a missed step, a wrong label \
          or a bump."
-        "A reading of the turntable was in error and has practically no weight in the results."
+        "A reading of the turntable was wrong and has practically no weight in the results."
     MoveWrong = "W17" "move-wrong" Care:
         "In one move, the integrated gyro angle differs from the change of attitude. turncal estimated the \
          difference. Check this move for lost samples, a rate beyond the gyro range, or a mount that slipped."
-        "The rotation measured in a move was in error; the error was estimated together with the results."
+        "The rotation measured in a move was wrong; the error was estimated together with the results."
     BiasStep = "W18" "bias-step" Care:
         "A bias changed permanently between two dwells. turncal estimated this change; the calibration contains the \
          mean bias over the recording. Look for a shock or a change of supply voltage or temperature at that time, and \
@@ -193,7 +194,7 @@ kinds! {
     VelocityWrong = "W32" "velocity-wrong" Care:
         "In one move, the velocity change from the accelerometers has a far larger error than in other moves. turncal \
          estimated this error. Check this move for lost samples, a force beyond the range, or a bump."
-        "The acceleration measured in a move was in error; the error was estimated together with the results."
+        "The acceleration measured in a move was wrong; the error was estimated together with the results."
     Slipped = "W33" "slipped" Care:
         "From one dwell on, all attitudes are rotated by the same angle: the instrument slipped on the table, or the \
          table slipped on the ground. turncal estimated the angle, so scale factors and biases are hardly less \

@@ -167,7 +167,7 @@ impl Stage {
         if exists && fs::rename(&old, &self.target).is_err() {
             let stage = self.beside.stage.display();
             let doing = format!("move the output into place (the old output is in {stage})");
-            let advice = "Move it back by hand.";
+            let advice = "Move the old output back by hand.";
             return Err(FileError::io(&self.target, &doing, &error, advice));
         }
         Err(refused(error))
