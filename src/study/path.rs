@@ -104,7 +104,8 @@ pub enum PathError {
 impl PathStudy {
     /// Reads a path and the models that are given by name.
     ///
-    /// # Errors [`PathError`] if a model cannot be read, or the words are not moves.
+    /// # Errors
+    /// Returns [`PathError`] if a model cannot be read, or if the path is neither a model nor a valid list of moves.
     pub fn load(named: &Named) -> Result<Self, PathError> {
         let by_hand = named.path.contains(',') || named.path.starts_with("turn ");
         let usual = if by_hand { "mems" } else { "demo" };

@@ -1,4 +1,4 @@
-//! Tests whether the gyros sense the Earth rate of the stated latitude.
+//! Tests whether the gyros sense the Earth rate at the stated latitude.
 
 use nalgebra::Vector3;
 use serde_json::json;
@@ -15,7 +15,7 @@ use crate::units::{DEG_PER_H, DEGREE, PPM};
 /// Gravity of a wrong latitude makes accelerometer scale factors useless beyond this many σ.
 const USELESS: f64 = 4.0;
 
-/// The finding, if the sensed Earth rate is not that of the stated latitude.
+/// The finding, if the sensed Earth rate differs from that at the stated latitude.
 pub fn earth_rate(problem: &Problem, outcome: &Outcome) -> Option<Finding> {
     let candidates = &outcome.solved.effects.candidates;
     let count = candidates.absent().count();

@@ -62,7 +62,8 @@ pub struct Calibration {
     /// Unit of the file's quantity, such as `count`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<PerSensor<String>>,
-    /// Quantity in a row of the file. For rates, N is the row; otherwise, N is the row divided by the sample period.
+    /// Quantity in a row of the file. For rates, N is the row; for increments and pulses, N is the row divided by the
+    /// sample period.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub output: Option<Output>,
     /// Columns of the log along x, y and z of each triad, with a minus sign if the sign is reversed.
@@ -303,7 +304,8 @@ impl Word {
 
 /// `calibration["gyro.bias.x"]`: a parameter by name, in the file's quantity, as [`Calibration::get`].
 ///
-/// # Panics If there is no parameter with that name, as with a map; `get` does not panic.
+/// # Panics
+/// Panics if there is no parameter with that name, as with a map; `get` does not panic.
 impl Index<&str> for Calibration {
     type Output = f64;
 

@@ -1,11 +1,11 @@
 //! Average over effects that may be absent and whose size is not known, such as error terms and temperature orders.
 //!
-//! A group of constants is absent with a prior probability, usually one half; otherwise it has its typical magnitude,
-//! known to a factor of three. The posterior of all constants is the average over these cases. With many groups, the
-//! average is found as in expectation propagation (Minka 2001, "Expectation propagation for approximate Bayesian
-//! inference", UAI 17): each group gets the normal prior about zero for which its mean equals that of the average over
-//! its own cases, given the priors of all others. The covariance is then the covariance within the cases plus the
-//! covariance between the cases.
+//! A group of constants is absent with a prior probability, usually one half; if it is present, it has its typical
+//! magnitude, known to a factor of three. The posterior of all constants is the average over these cases. With many
+//! groups, the average is found as in expectation propagation (Minka 2001, "Expectation propagation for approximate
+//! Bayesian inference", UAI 17): each group gets the normal prior about zero for which its mean equals that of the
+//! average over its own cases, given the priors of all others. The covariance is then the covariance within the cases
+//! plus the covariance between the cases.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 

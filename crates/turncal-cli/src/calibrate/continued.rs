@@ -56,7 +56,9 @@ impl Continued {
 
     /// Checks that the first lines of a source continue this file.
     ///
-    /// # Errors If no line is a row of the same kind, if the column names differ, or if the file already contains all rows.
+    /// # Errors
+    /// Returns an error if no line is a row of the same kind, if the column names differ, or if the file already
+    /// contains all rows.
     pub fn check(&self, first: &[Vec<u8>]) -> anyhow::Result<()> {
         let log = self.log.display();
         let lines = first.iter().filter(|line| !is_remark(line));

@@ -69,7 +69,7 @@ struct Member {
 }
 
 impl Streams {
-    /// Examines a log; returns `None` for a text with a single stream.
+    /// Examines a log; returns `None` for a text file with a single stream.
     pub fn of_file(
         file: &DataFile,
         wanted: Option<&str>,
@@ -414,7 +414,7 @@ fn names(found: &Found) -> Vec<String> {
     bare.iter().map(|name| format!("{stream}.{name}")).collect()
 }
 
-/// The streams of a text whose rows are distinguished by tags; empty for other texts.
+/// The streams of a text file with tagged rows; empty for other text files.
 fn tagged(file: &DataFile) -> Result<Vec<Member>, FileError> {
     let of_tag = |tag: String| {
         let source = Source {
@@ -447,7 +447,7 @@ fn tagged(file: &DataFile) -> Result<Vec<Member>, FileError> {
         .collect()
 }
 
-/// Rows of a text as a stream.
+/// Rows of a text file as a stream.
 fn rows_as_stream(name: &str, sheet: &Sheet) -> Found {
     let column = |(name, unit): (&String, &String)| {
         let unit = Name::of_column(name, unit).unit;

@@ -45,7 +45,8 @@ const COUNTRIES: &str = "AD AE AF AG AI AL AM AO AQ AR AS AT AU AW AX AZ BA BB B
 
 /// Reads and checks a lab.toml. `meta` contains metadata of the run, to complete `[item]`.
 ///
-/// # Errors [`FileError`] that lists all empty or missing fields, or gives the first invalid one.
+/// # Errors
+/// Returns a [`FileError`] that lists all empty or missing fields, or states the first invalid one.
 pub fn read_laboratory(
     path: &Path,
     meta: impl Fn(&str) -> Option<String>,

@@ -278,7 +278,7 @@ pub struct TurntableFile {
     pub columns: TableColumns,
     /// Axis of each angle when all angles are zero, such as z, x, y
     pub axes: Option<Vec<String>>,
-    /// 1σ per axis of the position error, ″: constant in a dwell, independent at every position
+    /// 1σ per axis of the position error, ″: constant in a dwell, independent between positions
     pub position_sigma_arcsec: Angle,
     /// 1σ per axis of the white error of each reading, ″
     pub reading_sigma_arcsec: Angle,

@@ -47,7 +47,7 @@ pub enum Mark {
     Cross,
 }
 
-/// Position of a text.
+/// Position of the text relative to its point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Anchor {
     /// The text is centred above its point.

@@ -73,7 +73,7 @@ pub fn rgb(color: Color) -> RGBColor {
     }
 }
 
-/// Approximate width of a text, in one of the wider fonts.
+/// Approximate width of a string, in one of the wider fonts.
 pub fn width(text: &str, scale: f64) -> f64 {
     let of = |letter: char| match letter {
         'i' | 'j' | 'l' | '\'' | '|' | 'I' => 0.29,
@@ -129,7 +129,7 @@ impl Canvas {
     {
         let mut document = String::new();
         let area = SVGBackend::with_string(&mut document, (MOST, MOST)).into_drawing_area();
-        // Writing into a text does not fail.
+        // Writing into a string does not fail.
         let _ = area.draw(&element);
         drop(area);
         let inside = document.split_once(">\n").map_or("", |(_, inside)| inside);
