@@ -74,8 +74,9 @@ impl WholeDirectory {
 
     /// Moves the directory into place, with a list of its entries in the file `.turncal`.
     pub fn commit(self) -> Result<(), FileError> {
-        let list = manifest::of_all(&self.path())
-            .map_err(|error| unwritable(self.stage.target(), "move the output into place", &error))?;
+        let list = manifest::of_all(&self.path()).map_err(|error| {
+            unwritable(self.stage.target(), "move the output into place", &error)
+        })?;
         self.commit_with(&list)
     }
 

@@ -118,7 +118,7 @@ impl Draft {
             );
         }
         remarks.reason("imu.time_unit", &clock.why);
-        let why = "guess: a row covers the interval that ends at its time stamp; if not, set \\"start\\" or \\"middle\\"";
+        let why = "guess: a row covers the interval that ends at its time stamp; if not, set \"start\" or \"middle\"";
         remarks.reason("imu.time_stamp", why);
         remarks.reason("imu.continuous", self.why_continuous());
         let why = "the log contains several instruments; this value selects the first";
@@ -207,9 +207,7 @@ impl Draft {
             remarks.reason(path, AXES_OF_PROGRAM);
             return axes;
         }
-        let mut why =
-            "guess: x right, y front, z up; if not, set \\"frd\\" or \\"flu\\""
-                .to_owned();
+        let mut why = "guess: x right, y front, z up; if not, set \"frd\" or \"flu\"".to_owned();
         if is_of_autopilot(&self.columns.names) {
             why += "; the column names are those of PX4 or ArduPilot, which use \"frd\"";
         }
