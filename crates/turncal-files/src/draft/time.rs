@@ -117,7 +117,8 @@ impl Clock {
         let is_open = named.is_none() && known.is_none() && name.is_in_ticks();
         let doubt_of_ticks = is_open.then(|| {
             format!(
-                "The length of a tick in the column `{}` is not stated. turncal assumed the most common length. State --rate.",
+                "The length of a tick in the column `{}` is not stated. turncal assumed the most common length. \
+                 State --rate.",
                 sheet.names[column]
             )
         });

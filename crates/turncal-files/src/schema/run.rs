@@ -75,7 +75,7 @@ pub struct ImuFile {
     pub stream: Option<String>,
     /// Accelerometers that are not in the rows of the gyros
     pub accel_from: Option<AccelFromFile>,
-    /// Use a damaged log up to the damage; default: false
+    /// Use a damaged log up to the damaged part; default: false
     pub salvage: Option<bool>,
     /// Quantity in a row: number of whole counts in the sample (pulse), integral over the sample (increment) or mean
     /// over the sample (rate)
@@ -105,7 +105,7 @@ pub struct ImuFile {
     pub body_axes: Option<BodyAxes>,
     /// Use only the rows of one of several instruments
     pub instance: Option<InstanceFile>,
-    /// Names or numbers of the columns; a minus before a name reverses its sign
+    /// Names or numbers of the columns; a minus sign before a name reverses the sign of the column
     pub columns: ImuColumns,
     /// Noise figures by name, such as angle_random_walk_deg_per_sqrt_h
     #[serde(default)]
@@ -154,7 +154,7 @@ pub struct AccelFromFile {
     pub file: Option<String>,
     /// Stream that contains the accelerometers
     pub stream: Option<String>,
-    /// Use a damaged log up to the damage
+    /// Use a damaged log up to the damaged part
     pub salvage: Option<bool>,
     /// Time column of the accelerometers
     pub time: Option<TimeColumn>,
@@ -268,7 +268,7 @@ pub struct TurntableFile {
     pub file: String,
     /// Stream that contains the attitude, in a file with several streams
     pub stream: Option<String>,
-    /// Use a damaged log up to the damage; default: false
+    /// Use a damaged log up to the damaged part; default: false
     pub salvage: Option<bool>,
     /// Unit of the time column
     pub time_unit: Option<TimeUnitField>,

@@ -159,7 +159,10 @@ impl Stamps {
         }
         let time = self.time_of(csv, column)?;
         if time + self.usual_step() == time {
-            return Err(csv.not(column, "a time small enough to resolve one sample period"));
+            return Err(csv.not(
+                column,
+                "a time value small enough to resolve one sample period",
+            ));
         }
         if let Some(before) = self.time {
             let step = time - before;
