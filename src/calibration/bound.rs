@@ -125,7 +125,7 @@ pub fn terms_left_off(
 }
 
 /// The problem in the misalignment form of a truth, with stated noise.
-fn at_truth<'a>(problem: &Problem<'a>, truth: &PerSensor<Triad>) -> Problem<'a> {
+pub(super) fn at_truth<'a>(problem: &Problem<'a>, truth: &PerSensor<Triad>) -> Problem<'a> {
     problem.with(|model| *model = model.in_form(problem.run(), truth.gyro.form))
 }
 

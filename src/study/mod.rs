@@ -2,6 +2,8 @@
 
 pub mod accuracy;
 mod checked;
+pub mod design;
+
 pub mod experiment;
 pub mod navigation;
 pub mod path;

@@ -35,7 +35,9 @@ pub struct Named<'a> {
     pub imu: Option<&'a str>,
     /// Table to use instead of the one in the scenario.
     pub table: Option<&'a str>,
-    /// Observations used by the filter. `None` means the table or, for moves by hand, velocity.
+    /// Whether the sensor is turned by hand, without a table; a list of moves always is.
+    pub by_hand: bool,
+    /// Observations used by the filter. `None` means the table or, by hand, velocity.
     pub aiding: Option<Aiding>,
     /// Error terms to estimate.
     pub terms: Vec<ErrorTerm>,
@@ -107,7 +109,30 @@ impl PathStudy {
     /// # Errors
     /// Returns [`PathError`] if a model cannot be read, or if the path is neither a model nor a valid list of moves.
     pub fn load(named: &Named) -> Result<Self, PathError> {
-        let by_hand = named.path.contains(',') || named.path.starts_with("turn ");
+        let is_words = named.path.contains(',') || named.path.starts_with("turn ");
+        let setting = Self::setting(&Named {
+            by_hand: named.by_hand || is_words,
+            ..named.clone()
+        })?;
+        let scenario = if is_words {
+            let path = path_by_hand(named.path);
+            let along = path.and_then(|path| setting.scenario.along(path, "by hand"));
+            along.map_err(PathError::Words)?
+        } else {
+            setting.scenario.with_path(named.path)?
+        };
+        Ok(Self {
+            scenario,
+            ..setting
+        })
+    }
+
+    /// The setting of paths: the models given by name, with the path of the scenario, which the table may not be able
+    /// to follow.
+    ///
+    /// # Errors [`PathError`] if a model cannot be read.
+    pub fn setting(named: &Named) -> Result<Self, PathError> {
+        let by_hand = named.by_hand;
         let usual = if by_hand { "mems" } else { "demo" };
         let mut scenario = Scenario::load(named.scenario.unwrap_or(usual))?;
         if let Some(model) = named.imu {
@@ -118,10 +143,6 @@ impl PathStudy {
         }
         if by_hand {
             scenario.integrator.lever_arm = Default::default();
-            let along = path_by_hand(named.path).and_then(|path| scenario.along(path, "by hand"));
-            scenario = along.map_err(PathError::Words)?;
-        } else {
-            scenario = scenario.with_path(named.path)?;
         }
         let aiding = match (named.aiding, by_hand) {
             (Some(aiding), _) => aiding,
@@ -163,7 +184,7 @@ impl PathStudy {
     }
 
     /// A simulated recording along the path, with its truth.
-    fn record(&self) -> Result<(Run, PerSensor<Triad>, TermVector), TableError> {
+    pub(super) fn record(&self) -> Result<(Run, PerSensor<Triad>, TermVector), TableError> {
         let simulated = self.scenario.simulate(self.scenario.seed, 0)?;
         let mut run = simulated.run;
         if self.by_hand {

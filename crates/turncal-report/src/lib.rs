@@ -39,6 +39,7 @@ pub mod check;
 pub mod conversion;
 pub mod experiment;
 mod group;
+mod ieee;
 pub mod lot;
 pub mod navigation;
 pub mod path;

@@ -1,6 +1,8 @@
 //! Report on a path: expected σ and table time, the value of each move, the errors that the path does not show, and
 //! whether a specification can be decided.
 
+mod shipped;
+
 use serde::Serialize;
 
 use super::navigation;
@@ -11,6 +13,7 @@ use turncal::calibration::{
 use turncal::imu::{AXES, InstallationForm};
 use turncal::lot::{Check, Verdict};
 use turncal::simulation::Scenario;
+use turncal::study::design::Design;
 use turncal::study::navigation::MethodOutlook;
 use turncal::study::path::{Evaluation, PathStudy, Without};
 use turncal::turntable::{Moves, Rotation};
@@ -32,6 +35,8 @@ pub struct Report<'a> {
     pub evaluation: &'a Evaluation,
     /// Limits of the specification that the calibration must decide, if any.
     pub checks: Option<&'a [Check]>,
+    /// The design of the path, if it was designed.
+    pub design: Option<&'a Design>,
 }
 
 /// A combination of parameters or an error term that the path does not show.
@@ -65,6 +70,9 @@ impl Report<'_> {
             self.with
         )];
         document.both(self.groups());
+        if let Some(design) = self.design {
+            document.both(shipped::table(design));
+        }
         document.both(self.facts(&navigated));
         document.both(self.moves());
         document.both(table(&not_shown));
@@ -245,6 +253,7 @@ impl Report<'_> {
             "without": without.collect::<Value>(),
             "not_shown": not_shown,
             "not_decided": self.checks.map(|_| self.not_decided()),
+            "same_time": self.design.map(shipped::data),
         })
     }
 }

@@ -1,6 +1,7 @@
 //! Report on a calibration file, with the values as written in the file.
 
 use super::calibration::{cross_validation, in_order};
+use super::ieee;
 use super::prelude::*;
 use super::values;
 use turncal::calibration::Calibration;
@@ -17,6 +18,7 @@ pub fn document(calibration: &Calibration, name: &str) -> Document {
     document.both(parameters(calibration));
     document.both(noise(calibration));
     document.both(terms(calibration));
+    document.both(ieee::table(calibration));
     document
 }
 

@@ -3,7 +3,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::effects::{Dispersion, Sizes};
-use super::links::{Chain, Link};
+use super::links::{Chain, Link, Rows, Transition};
 use super::states::States;
 use crate::calibration::constants::Sites;
 use crate::calibration::{CalibrationError, Constant, Known, Posterior, Prior, Problem, Script};
@@ -30,7 +30,8 @@ pub struct Passed {
 }
 
 /// The filter after a link: mean given zero constants, effect of the constants, and covariance of the states.
-struct Forward {
+#[derive(Debug, Clone)]
+pub struct Forward {
     mean: DVector<f64>,
     by_constants: DMatrix<f64>,
     covariance: DMatrix<f64>,
@@ -88,7 +89,7 @@ impl Chain {
 
 impl Forward {
     /// The filter before the first link.
-    fn new(states: usize, constants: usize) -> Self {
+    pub fn new(states: usize, constants: usize) -> Self {
         Self {
             mean: DVector::zeros(states),
             by_constants: DMatrix::zeros(states, constants),
@@ -102,7 +103,21 @@ impl Forward {
     /// # Errors
     /// Returns [`CalibrationError::Diverged`] if a covariance is not positive definite.
     fn pass(&mut self, link: &Link, sizes: &Sizes) -> Result<Passed, CalibrationError> {
-        let transition = &link.transition;
+        let (seen, log_determinant) = self
+            .step(&link.transition, &link.rows, sizes)
+            .ok_or(CalibrationError::Diverged { time: link.time })?;
+        self.log_determinant += log_determinant;
+        Ok(seen)
+    }
+
+    /// Filters a transition and the rows after it; also returns the log-determinant of the innovation covariance.
+    /// `None` if this covariance is not positive definite.
+    pub fn step(
+        &mut self,
+        transition: &Transition,
+        rows: &Rows,
+        sizes: &Sizes,
+    ) -> Option<(Passed, f64)> {
         let mean = &transition.states * &self.mean + &transition.offset;
         let by_constants = &transition.states * &self.by_constants + &transition.constants;
         let mut covariance = &transition.states * &self.covariance * transition.states.transpose()
@@ -111,13 +126,11 @@ impl Forward {
             let factor = sizes.of(drive.effect, drive.event);
             covariance.gemm(factor, &drive.by, &drive.by.transpose(), 1.0);
         }
-        let (seen, log_determinant) = Passed::new(link, mean, by_constants, covariance)
-            .ok_or(CalibrationError::Diverged { time: link.time })?;
-        self.log_determinant += log_determinant;
+        let (seen, log_determinant) = Passed::new(rows, mean, by_constants, covariance)?;
         self.mean = &seen.mean + seen.across.tr_mul(&seen.innovations);
         self.by_constants = &seen.by_constants - seen.across.tr_mul(&seen.of_constants);
         self.covariance = &seen.covariance - seen.across.tr_mul(&seen.across);
-        Ok(seen)
+        Some((seen, log_determinant))
     }
 }
 
@@ -125,12 +138,11 @@ impl Passed {
     /// Also returns the log-determinant of the innovation covariance; `None` if this covariance is not positive
     /// definite.
     fn new(
-        link: &Link,
+        rows: &Rows,
         mean: DVector<f64>,
         by_constants: DMatrix<f64>,
         covariance: DMatrix<f64>,
     ) -> Option<(Self, f64)> {
-        let rows = &link.rows;
         let mut across = &rows.states * &covariance;
         let mut of_innovations = &across * rows.states.transpose();
         (0..rows.values.len()).for_each(|k| of_innovations[(k, k)] += 1.0);

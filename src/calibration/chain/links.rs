@@ -11,7 +11,8 @@ use super::states::States;
 use crate::calibration::{CalibrationError, Constant, Problem, Script};
 pub use link::Link;
 use maker::Maker;
-use rows::Rows;
+pub use rows::Rows;
+pub use transition::Transition;
 
 /// The links of all stretches.
 #[derive(Debug, Clone)]

@@ -19,8 +19,9 @@ mod without;
 
 pub use backward::{Moments, Smoothed};
 pub use effects::{Dispersion, Effect, Sizes, Slip};
-pub use forward::Filtered;
-pub use links::Chain;
+pub use forward::{Filtered, Forward};
+pub use links::{Chain, Link, Rows, Transition};
+pub use states::States;
 
 #[cfg(test)]
 mod tests;

@@ -21,7 +21,7 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 
-use crate::Sheet;
+use crate::{Sheet, unit_scale};
 use columns::Columns;
 pub use found::Found;
 use motion::Motion;
@@ -31,14 +31,18 @@ pub use stated::{DataSheetError, KalibrImu, Stated, StatedColumns, StatedUnit};
 use streams::{FEWEST_ROWS, Streams};
 pub use time::Certainty;
 use time::Clock;
-use turncal::imu::{PerSensor, Sensor};
+use turncal::imu::{Output, PerSensor, Sensor};
 use turncal::noise::{Clusters, TriadNoise};
+use turncal::number::rounded;
+use turncal::units::STANDARD_GRAVITY;
 use turncal_input::FileError;
 use turncal_logs::DataFile;
 use units::Quantities;
 
 /// Minimum number of samples at rest for a noise estimate.
 const FEWEST_AT_REST: usize = 64;
+/// Fraction of gravity that no scale or bias of an accelerometer leaves.
+const LITTLE: f64 = 0.3;
 
 const NO_COLUMNS: &str = "not recognised by their names or values";
 const AXES_OF_PROGRAM: &str = "axis convention of the program that wrote the log";
@@ -262,7 +266,8 @@ impl Draft {
         let of_units = || self.quantities.contradiction(&self.stated, &motion, period);
         let exchanged = || self.are_exchanged(rows, sheet).then(|| self.exchanged());
         let contradiction = self.contradiction.clone().or_else(of_units);
-        self.contradiction = contradiction.or_else(exchanged);
+        let contradiction = contradiction.or_else(exchanged);
+        self.contradiction = contradiction.or_else(|| self.without_gravity(&motion));
         self.quantities.state(&self.stated);
         self.random_walk = self.noise_at_rest(rows, &motion).unwrap_or_default();
         self.offset = rows.offset;
@@ -289,6 +294,24 @@ impl Draft {
                 sheet, columns, clock, rows.whole, &motion,
             ))
         }
+    }
+
+    /// Evidence, statement and remedy if the accelerometers do not measure gravity in the unit that the file states.
+    fn without_gravity(&self, motion: &Motion) -> Option<[String; 3]> {
+        let unit = &self.quantities.units.accel;
+        let is_rate = self.quantities.output == Output::Rate;
+        let word = unit.word.filter(|_| is_rate && !unit.is_shown)?;
+        let at_rest = motion.gravity / unit_scale(Sensor::Accel, word)?;
+        (at_rest < LITTLE * STANDARD_GRAVITY).then(|| {
+            [
+                format!(
+                    "{} m/s² at rest in the columns of the accelerometers",
+                    rounded(at_rest, 3)
+                ),
+                "gravity".to_owned(),
+                "Log accelerations with gravity, not linear or user accelerations.".to_owned(),
+            ]
+        })
     }
 
     fn exchanged(&self) -> [String; 3] {

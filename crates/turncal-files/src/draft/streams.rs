@@ -422,6 +422,15 @@ fn tagged(file: &DataFile) -> Result<Vec<Member>, FileError> {
             ..Source::of_file(file.clone())
         };
         let mut sheet = Sheet::of(source.open()?, 1)?;
+        if let Some((column, number)) = columns::instance(&sheet) {
+            let name = &sheet.names[column];
+            return Err(FileError::of(
+                file,
+                format_args!("several instruments in the rows `{tag}`, by the column `{name}`"),
+                "the rows of one instrument",
+                &format!("Keep the rows of one, such as those with {name} = {number}."),
+            ));
+        }
         let mut member = Member::of_stream(file, rows_as_stream(&tag, &sheet));
         sheet.names = names(&member.found);
         let columns = Columns::find(&sheet);
@@ -442,9 +451,10 @@ fn tagged(file: &DataFile) -> Result<Vec<Member>, FileError> {
     // Rows that only comment on others need not be regular.
     let members = CsvFile::tags(file)?.into_iter().map(of_tag);
     let (read, refused): (Vec<_>, Vec<_>) = members.partition(Result::is_ok);
-    if read.is_empty() { refused } else { read }
-        .into_iter()
-        .collect()
+    let is_inertial = |of: &Member| of.triads != PerSensor::default();
+    let is_enough = read.iter().flatten().any(is_inertial) || refused.is_empty();
+    let members = if is_enough { read } else { refused };
+    members.into_iter().collect()
 }
 
 /// Rows of a text file as a stream.

@@ -270,7 +270,7 @@ impl Labelled {
             .count()
             > count;
         let mut section = Section::default();
-        let marked = lines.map(|line| section.marked(&line.text, comma));
+        let marked = lines.clone().map(|line| section.marked(&line.text, comma));
         let mut kinds: Vec<Kind> = Vec::new();
         let mut places = HashMap::new();
         // Indices of the kinds of all lines with numbers.
@@ -293,7 +293,12 @@ impl Labelled {
         let is_stream = |place: &usize| kinds[*place].count >= least;
         let streams = kinds.iter().filter(|kind| kind.count >= least);
         let rows: usize = streams.clone().map(|kind| kind.count).sum();
-        let labelled = streams.clone().filter(|kind| is_labelled(&kind.shape));
+        let is_of_table = |kind: &Kind| {
+            let mut lines = lines.clone();
+            lines.any(|line| names_fields(&line.text, &kind.shape))
+        };
+        let labelled = streams.clone();
+        let labelled = labelled.filter(|kind| is_labelled(&kind.shape) && !is_of_table(kind));
         let of_labelled: usize = labelled.map(|kind| kind.count).sum();
         if 2 * of_labelled <= rows || 2 * rows <= order.len() {
             return None;
@@ -466,16 +471,7 @@ fn has_decimal_comma(line: &[u8]) -> bool {
 /// Whether a field has words or signs next to its number, a row has words between its numbers, or the row begins like a
 /// comment or a sentence of a receiver.
 fn is_labelled(shape: &[u8]) -> bool {
-    let is_mark = |byte: &u8| matches!(*byte, MARK | WORD);
-    let has_mark = |field: &[u8]| field.iter().any(is_mark);
-    // The separator of most numbers.
-    let parted = |by: &u8| {
-        let fields = shape.split(|byte| byte == by);
-        fields.filter(|field| has_mark(field)).count()
-    };
-    let separators = [b'|', b',', b'\t', b';'];
-    let separator = separators.into_iter().filter(|byte| shape.contains(byte));
-    let separator = separator.max_by_key(parted);
+    let separator = separator(shape);
     let is_mixed = |field: &[u8]| {
         let field = field.trim_ascii();
         let quoted = field
@@ -505,6 +501,43 @@ fn is_labelled(shape: &[u8]) -> bool {
         || fields.iter().any(|field| is_mixed(field))
         || names_next
         || is_enclosed
+}
+
+fn has_mark(field: &[u8]) -> bool {
+    field.iter().any(|byte| matches!(*byte, MARK | WORD))
+}
+
+/// The separator of most numbers; `None` for blanks.
+fn separator(shape: &[u8]) -> Option<u8> {
+    let parted = |by: &u8| {
+        let fields = shape.split(|byte| byte == by);
+        fields.filter(|field| has_mark(field)).count()
+    };
+    let separators = [b'|', b',', b'\t', b';'].into_iter();
+    separators
+        .filter(|byte| shape.contains(byte))
+        .max_by_key(parted)
+}
+
+/// Whether a line has a word for each field of rows of this shape, which are then those of a table.
+fn names_fields(line: &[u8], shape: &[u8]) -> bool {
+    let Some(by) = separator(shape) else {
+        return false;
+    };
+    let fields = |text: &[u8]| {
+        let end = text
+            .iter()
+            .rposition(|byte| *byte != by && !byte.is_ascii_whitespace());
+        text[..end.map_or(0, |end| end + 1)]
+            .split(|byte| *byte == by)
+            .count()
+    };
+    let is_word = |field: &[u8]| {
+        let field = field.trim_ascii();
+        !field.is_empty() && number(field, true) != Some(field.len())
+    };
+    let count = fields(line);
+    count == fields(shape) && line.split(|byte| *byte == by).take(count).all(is_word)
 }
 
 /// The kinds of lines, if all of them follow each other in turn.

@@ -19,7 +19,7 @@ mod tests;
 use std::collections::BTreeSet;
 
 use crate::prelude::*;
-use crate::{navigation, terms, values};
+use crate::{ieee, navigation, terms, values};
 use turncal::calibration::{Finding, FindingKind};
 use turncal::imu::{Noise, Sensor};
 
@@ -60,6 +60,7 @@ impl Report<'_> {
         if let Some(estimate) = self.estimate() {
             document.both(self.parameters(estimate));
         }
+        document.both(ieee::table(self.calibration));
         document.fold("Residuals, consistency, error terms");
         if let Some(quality) = self.quality {
             document.both(tables::residuals(quality, self.table()));

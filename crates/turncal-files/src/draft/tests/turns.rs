@@ -76,7 +76,7 @@ fn a_turn_within_two_rows_is_no_cut_if_gyros_show_it() {
     };
     has(
         &drafted(&laid_end_to_end.rows()),
-        &["continuous = false  # gravity direction jumps in 4 places"],
+        &["continuous = false  # the gravity direction jumps in 4 places"],
     );
 }
 
@@ -128,7 +128,7 @@ fn one_rough_turn_and_none_are_told_apart() {
     has(
         &drafted(never),
         &[
-            "# gyro_unit =  # TODO: gravity direction does not change, so the unit cannot be estimated",
+            "# gyro_unit =  # TODO: the gravity direction does not change, so the unit cannot be estimated",
         ],
     );
     // A hand that shakes as it turns.

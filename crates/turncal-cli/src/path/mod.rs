@@ -1,23 +1,26 @@
 //! `turncal path`
 
-use crate::arguments::{AIDINGS, one_of};
-use std::path::{Path, PathBuf};
+mod design;
+mod setting;
+
+use std::path::Path;
 
 use anyhow::Context;
 use clap::Subcommand;
 
 use crate::NotMet;
-use crate::arguments::{Delivery, OfLog, With, needs_table, with_value};
+use crate::arguments::{Delivery, OfLog, With};
 use crate::terminal::Activity;
+use design::Design;
+use setting::Setting;
 use turncal::calibration::Word;
-use turncal::models::specification;
-use turncal::run::Aiding;
-use turncal::study::path::{Evaluation, Named, PathStudy};
+use turncal::study::path::{Evaluation, PathStudy};
 use turncal_files::Opened;
 use turncal_input::small_file;
+use turncal_report::Document;
 use turncal_report::path::{Report, in_words, moves_in_words};
 
-/// Predicts the calibration accuracy of a table path or of moves by hand, before any data exist
+/// Predicts calibration accuracy for a path, or designs a path, before any data exist
 #[derive(Debug, clap::Args)]
 #[command(arg_required_else_help = true)]
 #[command(after_help = "Example:  turncal path evaluate three-axis")]
@@ -29,12 +32,15 @@ pub struct PathCommand {
 #[derive(Debug, Subcommand)]
 enum Command {
     Evaluate(Evaluate),
+    Design(Design),
 }
 
 impl PathCommand {
     pub fn run(&self) -> anyhow::Result<()> {
-        let Command::Evaluate(evaluate) = &self.command;
-        evaluate.run()
+        match &self.command {
+            Command::Evaluate(evaluate) => evaluate.run(),
+            Command::Design(design) => design.run(),
+        }
     }
 }
 
@@ -53,37 +59,19 @@ impl PathCommand {
 pub struct Evaluate {
     /// Path: a TOML file, an embedded name, a list of moves such as "z_up, turn x 90", or a run.toml
     path: String,
-    /// Scenario that provides the site, rate, instrument and table [default: demo; by hand: mems]
-    #[arg(long, value_name = "SCENARIO")]
-    scenario: Option<String>,
-    /// Instrument to use instead of the scenario's instrument: a TOML file or an embedded name
-    #[arg(long, value_name = "MODEL")]
-    imu: Option<String>,
-    /// Table to use instead of the scenario's table: a TOML file or an embedded name
-    #[arg(long, value_name = "MODEL")]
-    table: Option<String>,
-    /// Observations used by the filter [default: table; by hand: velocity]
-    #[arg(long, value_parser = one_of(&AIDINGS))]
-    aiding: Option<Aiding>,
-    /// Error terms to estimate. auto: average over the absence and the typical magnitudes of every term; none: only K,
-    /// E and D; or names of terms that are always estimated [default: auto]
-    #[arg(long, value_name = "TERM", value_parser = with_value(), value_delimiter = ',')]
-    with: Vec<With>,
-    /// Specification; turncal tests whether the predicted σ are small enough to decide pass or fail
-    #[arg(long, value_name = "FILE")]
-    specification: Option<PathBuf>,
+    #[command(flatten)]
+    setting: Setting,
     #[command(flatten)]
     delivery: Delivery,
 }
 
 impl Evaluate {
     fn run(&self) -> anyhow::Result<()> {
-        With::check(&self.with);
-        let specification = self.specification.as_deref().map(specification);
-        let specification = specification.transpose()?;
+        With::check(&self.setting.with);
+        let specification = self.setting.limits()?;
         let file = Path::new(&self.path);
         let inputs: Vec<&Path> = std::iter::once(file)
-            .chain(self.specification.as_deref())
+            .chain(self.setting.specification.as_deref())
             .collect();
         let begun = self.delivery.begin(&inputs)?;
         let activity = Activity::new("evaluating the path");
@@ -100,48 +88,42 @@ impl Evaluate {
             moves: &moves,
             evaluation: &evaluation,
             checks: checks.as_deref(),
+            design: None,
         };
         let document = report.document();
         begun.deliver(&document)?;
-        match document.verdict {
-            Some((Word::Undecided, text)) => {
-                Err(NotMet::Specification(format!("{name}: {text}")).into())
-            }
-            _ => Ok(()),
-        }
-    }
-
-    fn named(&self) -> Named<'_> {
-        Named {
-            path: &self.path,
-            scenario: self.scenario.as_deref(),
-            imu: self.imu.as_deref(),
-            table: self.table.as_deref(),
-            aiding: self.aiding,
-            terms: With::terms(&self.with).collect(),
-        }
+        undecided(&name, &document)
     }
 
     fn of_run(&self, file: &Path) -> anyhow::Result<(String, String, Vec<String>, Evaluation)> {
         let Opened { run, .. } = OfLog::default().open(file)?;
-        let aiding = self.aiding.unwrap_or_else(|| run.aiding());
-        With::terms(&self.with).for_each(|term| needs_table(term, Some(aiding)));
-        let mut options = self.named().options(aiding);
-        options.auto_terms = With::is_auto(&self.with);
+        let aiding = self.setting.aiding.unwrap_or_else(|| run.aiding());
+        self.setting.check_terms(Some(aiding));
+        let mut options = self.setting.named(&self.path).options(aiding);
+        options.auto_terms = With::is_auto(&self.setting.with);
         let evaluation = Evaluation::of_run(&run, &options).with_context(|| self.path.clone())?;
         let with = format!("Recording of {}, with the noise stated there", self.path);
         Ok((run.recording.name.clone(), with, Vec::new(), evaluation))
     }
 
     fn of_path(&self) -> anyhow::Result<(String, String, Vec<String>, Evaluation)> {
-        let mut study = PathStudy::load(&self.named())?;
-        study.options.auto_terms = With::is_auto(&self.with);
-        let aiding = study.options.aiding;
-        With::terms(&self.with).for_each(|term| needs_table(term, aiding));
+        let mut study = PathStudy::load(&self.setting.named(&self.path))?;
+        study.options.auto_terms = With::is_auto(&self.setting.with);
+        self.setting.check_terms(study.options.aiding);
         let name = study.scenario.path_name.clone();
         let moves = moves_in_words(&study.scenario);
         let evaluation = study.evaluate().with_context(|| format!("path {name}"))?;
         Ok((name, in_words(&study), moves, evaluation))
+    }
+}
+
+/// The exit status of a specification that cannot be decided.
+fn undecided(name: &str, document: &Document) -> anyhow::Result<()> {
+    match &document.verdict {
+        Some((Word::Undecided, text)) => {
+            Err(NotMet::Specification(format!("{name}: {text}")).into())
+        }
+        _ => Ok(()),
     }
 }
 
