@@ -130,7 +130,8 @@ impl PathStudy {
     /// The setting of paths: the models given by name, with the path of the scenario, which the table may not be able
     /// to follow.
     ///
-    /// # Errors [`PathError`] if a model cannot be read.
+    /// # Errors
+    /// Returns [`PathError`] if a model cannot be read.
     pub fn setting(named: &Named) -> Result<Self, PathError> {
         let by_hand = named.by_hand;
         let usual = if by_hand { "mems" } else { "demo" };

@@ -29,7 +29,7 @@ const USUAL_TIME: f64 = 600.0;
 const LONGEST: f64 = 3600.0;
 /// Shortest time that allows a few turns, s.
 pub const SHORTEST: f64 = 60.0;
-/// Usual duration of a turn, s.
+/// Typical duration of a turn, s.
 const TURN: f64 = 8.0;
 
 /// A path to design.
@@ -37,9 +37,9 @@ const TURN: f64 = 8.0;
 pub struct DesignStudy {
     /// The setting; its path has no effect.
     pub setting: PathStudy,
-    /// The limits that the path must decide; `None` to make every group better than on the paths for comparison.
+    /// The limits that the path must decide; `None` to determine every group better than the embedded paths do.
     pub specification: Option<Specification>,
-    /// The longest time, s; `None` for the usual one.
+    /// The longest time, s; `None` for the default.
     pub time: Option<f64>,
 }
 
@@ -50,7 +50,7 @@ pub struct Design {
     pub study: PathStudy,
     /// Expected results.
     pub evaluation: Evaluation,
-    /// Expected σ as those of the other paths.
+    /// Expected σ, computed in the same way as for the other paths.
     pub estimate: Estimate,
     /// Other paths in the same time.
     pub shipped: Vec<Shipped>,
@@ -62,7 +62,7 @@ impl DesignStudy {
     /// Designs the path.
     ///
     /// # Errors
-    /// [`PathError`] if the setting does not allow a calibration.
+    /// Returns [`PathError`] if the setting does not allow a calibration.
     pub fn design(&self) -> Result<Design, PathError> {
         // The verdict on a limit is about the stated terms.
         let mut setting = self.setting.clone();
@@ -141,7 +141,7 @@ fn along(setting: &PathStudy, path: Path) -> Result<PathStudy, PathError> {
     })
 }
 
-/// Expected σ of a path; with automatic terms, if every term that may be absent has its usual size.
+/// Expected σ of a path; with automatic terms, if every term that may be absent has its typical magnitude.
 fn expected(study: &PathStudy) -> Result<Estimate, PathError> {
     let (run, truth, terms) = study.record()?;
     let problem = Problem::new(&run, &study.options);

@@ -309,7 +309,8 @@ impl Draft {
                     rounded(at_rest, 3)
                 ),
                 "gravity".to_owned(),
-                "Log accelerations with gravity, not linear or user accelerations.".to_owned(),
+                "Log the acceleration including gravity, not the linear or user acceleration."
+                    .to_owned(),
             ]
         })
     }

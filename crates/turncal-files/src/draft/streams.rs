@@ -426,9 +426,13 @@ fn tagged(file: &DataFile) -> Result<Vec<Member>, FileError> {
             let name = &sheet.names[column];
             return Err(FileError::of(
                 file,
-                format_args!("several instruments in the rows `{tag}`, by the column `{name}`"),
+                format_args!(
+                    "several instruments in the rows `{tag}`, distinguished by the column `{name}`"
+                ),
                 "the rows of one instrument",
-                &format!("Keep the rows of one, such as those with {name} = {number}."),
+                &format!(
+                    "Keep only the rows of one instrument, such as those with {name} = {number}."
+                ),
             ));
         }
         let mut member = Member::of_stream(file, rows_as_stream(&tag, &sheet));
