@@ -146,7 +146,7 @@ impl Site {
         }
     }
 
-    /// A site with normal gravity, whose σ is the usual gravity anomaly.
+    /// A site with normal gravity, with the typical gravity anomaly as its σ.
     pub fn with_normal_gravity(latitude: f64, longitude: f64, height: f64) -> Self {
         Self {
             latitude,

@@ -149,8 +149,8 @@ impl DecisionRule {
         match self {
             Self::GuardBand => {
                 "guard band w = U (ILAC-G8): pass if the value is inside its limit by at least the expanded \
-                 uncertainty, fail if it is outside its limit by at least the expanded uncertainty; otherwise the \
-                 pass or fail is conditional"
+                 uncertainty, fail if it is outside its limit by at least the expanded uncertainty; between these \
+                 limits, the pass or fail is conditional"
             }
             Self::SimpleAcceptance => {
                 "simple acceptance (ILAC-G8): pass if the value is within its limit, regardless of its uncertainty"

@@ -29,10 +29,10 @@ pub struct Bound {
 pub struct TermLeftOff {
     /// The term.
     pub term: ErrorTerm,
-    /// If the term were estimated with its usual σ: the remaining fraction of its prior σ, from 0 (known) to 1 (not
+    /// If the term were estimated with its typical σ: the remaining fraction of its prior σ, from 0 (known) to 1 (not
     /// observed). The value applies to the combination of parameters of the term for which the fraction is largest.
     pub remaining: f64,
-    /// 1σ of the change of each parameter caused by the term, if the term has its usual size.
+    /// 1σ of the change of each parameter caused by the term, if the term has its typical magnitude.
     pub change: ParameterVector,
 }
 

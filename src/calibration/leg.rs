@@ -13,7 +13,7 @@ use super::{
 use crate::imu::{PerSensor, TermVector, Triad};
 use crate::turntable::AxisError;
 
-/// Number of rows for the place of a new position.
+/// Number of rows that describe a new position.
 const PLACE: usize = 3;
 
 /// A move and the dwell after it, or the first dwell.
@@ -28,12 +28,12 @@ struct Part {
     link: Link,
     /// Covariance of the drives: noise of the move, a new position.
     driven: DMatrix<f64>,
-    /// Number of the first rows that are not affected by the noise at rest: the place of a new position.
+    /// Number of the first rows that are not affected by the noise at rest: those that describe a new position.
     of_place: usize,
 }
 
-/// Information on the parameters after some legs: the bound of their path with the stated noise, as [`super::bound`]; with
-/// automatic terms, that of an instrument that has every term with its usual size.
+/// Information on the parameters after some legs: the bound of their path with the stated noise, as [`super::bound`];
+/// with automatic terms, for an instrument that has every term with its typical magnitude.
 #[derive(Debug, Clone)]
 pub struct Journey {
     filter: Forward,
@@ -47,7 +47,7 @@ impl Leg {
     /// stretch.
     ///
     /// # Errors
-    /// [`CalibrationError`] if the recording cannot be reduced.
+    /// Returns [`CalibrationError`] if the recording cannot be reduced.
     pub fn all(
         problem: &Problem,
         (truth, terms): (&PerSensor<Triad>, &TermVector),
@@ -121,10 +121,10 @@ impl Journey {
         }
     }
 
-    /// The journey with another leg, whose noise at rest has its variance multiplied by a factor.
+    /// The journey extended by a leg, with the variance of the noise at rest multiplied by a factor.
     ///
     /// # Errors
-    /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
+    /// Returns [`CalibrationError::Diverged`] if a covariance is not positive definite.
     pub fn go(&mut self, leg: &Leg, factor: f64) -> Result<(), CalibrationError> {
         for part in &leg.parts {
             let (transition, rows) = part.dispersed(factor);
@@ -172,8 +172,8 @@ impl Journey {
     }
 }
 
-/// The problem at a truth. Terms that may be absent have their usual sizes, except wobble and encoder errors: of these,
-/// there are many, and they average out over the angles of a path.
+/// The problem at a truth. Terms that may be absent have their typical magnitudes, except wobble and encoder errors: of
+/// these, there are many, and they average out over the angles of a path.
 fn at_usual_sizes<'a>(problem: &Problem<'a>, truth: &PerSensor<Triad>) -> Problem<'a> {
     let averages_out = |term: &ErrorTerm| {
         use AxisError::{Encoder, Wobble};

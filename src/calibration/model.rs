@@ -22,7 +22,7 @@ pub const USUAL_LEVEL: f64 = 10.0 * ARCSEC;
 pub const USUAL_NORTH: f64 = 60.0 * ARCSEC;
 /// Default 1σ of each tilt of its axes, rad.
 const USUAL_TILT: f64 = 10.0 * ARCSEC;
-/// Usual time in which a table settles after a stop, s.
+/// Typical time in which a table settles after a stop, s.
 pub const SETTLING_TIME: f64 = 1.0;
 /// Default correlation time of a varying bias, s.
 const USUAL_CORRELATION: f64 = 100.0;
@@ -212,7 +212,7 @@ impl Model {
         }
     }
 
-    /// Switches an error term on; its σ is the usual one, unless the run states another σ. This has no effect if the
+    /// Switches an error term on; its σ is the typical one, unless the run states another σ. This has no effect if the
     /// run does not support the term.
     pub fn switch_on(&mut self, term: ErrorTerm) {
         self.may_have.retain(|&of| of != term);
@@ -227,7 +227,7 @@ impl Model {
         self.set(term, false);
     }
 
-    /// Sets an error term to its usual σ or to zero.
+    /// Sets an error term to its typical σ or to zero.
     fn set(&mut self, term: ErrorTerm, on: bool) {
         let times = f64::from(u8::from(on));
         match term {

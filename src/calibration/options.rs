@@ -20,11 +20,11 @@ use crate::run::Aiding;
 pub struct Options {
     /// Form of the misalignment matrix.
     pub form: InstallationForm,
-    /// Observations at rest. `None` means table attitude if there is a table log, otherwise zero velocity.
+    /// Observations at rest. `None` means table attitude if there is a table log, and zero velocity if there is none.
     pub aiding: Option<Aiding>,
     /// Error terms to estimate in addition to those with a σ stated for instrument or table.
     pub terms: Vec<ErrorTerm>,
-    /// Whether the estimate is averaged over the absence and the usual sizes of all other error terms.
+    /// Whether the estimate is averaged over the absence and the typical magnitudes of all other error terms.
     pub auto_terms: bool,
     /// Noise policy.
     pub noise: NoisePolicy,

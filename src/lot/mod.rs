@@ -1,8 +1,8 @@
 //! Comparison of several calibrations of one instrument, or of many instruments of one type.
 //!
 //! All calibrations are converted to one form, body frame and nominal scale. The results are the mean and spread of
-//! each quantity, with a test whether the spread exceeds the σ of the calibrations; outliers; differences from a truth;
-//! and the decisions on limits.
+//! each quantity, with a test of whether the spread exceeds the σ of the calibrations; outliers; differences from a
+//! truth; and the decisions on limits.
 
 mod joint;
 mod limits;

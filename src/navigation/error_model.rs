@@ -107,8 +107,8 @@ impl ErrorModel {
     }
 
     /// The exact discrete form over a time in s in which F, G and ε are constant: any time for a body at rest or in
-    /// steady motion; otherwise, a time over which attitude and velocity are nearly constant (Van Loan, "Computing
-    /// integrals involving the matrix exponential", IEEE Trans. Automatic Control 23, 1978).
+    /// steady motion; for any other motion, a time over which attitude and velocity are nearly constant (Van Loan,
+    /// "Computing integrals involving the matrix exponential", IEEE Trans. Automatic Control 23, 1978).
     pub fn over(&self, duration: f64) -> Transition {
         // All entries of the scaled matrix are of the order of the Schuler frequency, so the exponential remains
         // accurate over hours.

@@ -48,7 +48,8 @@ impl NonlinearError {
 
     /// Advances by a step of this duration in s, with this forcing at its start, middle and end.
     ///
-    /// # Errors If the computed position comes too close to a pole.
+    /// # Errors
+    /// Returns an error if the computed position comes too close to a pole.
     pub fn advance(&mut self, duration: f64, driven: [&Forcing; 3]) -> Result<(), NearPole> {
         let mut next = step(&self.0, duration, driven, Forcing::rate);
         let norm = next[SCALAR].hypot(next.fixed_rows::<3>(ATTITUDE).norm());

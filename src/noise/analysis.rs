@@ -67,7 +67,8 @@ impl Stretch {
     /// The longest segment with this label. Without a label, the longest standstill; if the recording is not
     /// continuous, the longest segment.
     ///
-    /// # Errors [`StretchError`] if there is no such stretch, or if it is too short.
+    /// # Errors
+    /// Returns [`StretchError`] if there is no such stretch, or if it is too short.
     pub fn find(run: &Run, label: Option<&str>) -> Result<Self, StretchError> {
         let segments = &run.recording.segments;
         let stretch = match label {

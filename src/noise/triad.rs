@@ -148,7 +148,7 @@ fn knocks(values: &[f64]) -> usize {
 }
 
 /// Result for the mean of several axes, with every process found on all axes. Figures of the mean are kept if they lie
-/// within the range of the axes; otherwise they are replaced by the root mean square of the axes. The mean separates
+/// within the range of the axes; if not, they are replaced by the root mean square of the axes. The mean separates
 /// processes better, but a process that is found only in the mean makes the other processes weaker.
 pub fn within(mut mean: Identified, axes: &[&Identified]) -> Identified {
     if axes.is_empty() {

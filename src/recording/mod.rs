@@ -61,7 +61,8 @@ impl Recording {
     /// of each sample, s; and the integrals of the normalised output (see [`crate::imu::Nominal`]) over each sample,
     /// rad and m/s along the right, front and up axes.
     ///
-    /// # Errors [`SampleError`] if the triads differ in length, a number is not finite, or the period is not positive.
+    /// # Errors
+    /// Returns [`SampleError`] if the triads differ in length, a number is not finite, or the period is not positive.
     pub fn from_samples(
         name: &str,
         start: f64,

@@ -18,8 +18,8 @@ pub struct ImuSamples {
     /// Stretches of consecutive samples, in order; there is at least one. Between two stretches at least one sample is
     /// lost.
     pub stretches: Vec<Stretch>,
-    /// Whether samples are consecutive in time; otherwise they are concatenated sections, and only a labelled section
-    /// or a dwell is continuous.
+    /// Whether samples are consecutive in time; if not, they are concatenated sections, and only a labelled section or
+    /// a dwell is continuous.
     pub continuous: bool,
     /// Integrals of the normalised gyro output over each sample, rad.
     pub gyro: Series,
@@ -47,7 +47,7 @@ impl ImuSamples {
         !self.continuous && self.len() < FEWEST_SAMPLES
     }
 
-    /// Whether a triad was recorded; otherwise its samples are zeros.
+    /// Whether a triad was recorded; if not, its samples are zeros.
     pub fn has(&self, sensor: Sensor) -> bool {
         let is_named = |log: &LogFacts| !log.named.triads.get(sensor)[0].name.is_empty();
         self.log.as_ref().is_none_or(is_named)

@@ -54,7 +54,7 @@ impl Run {
         }
     }
 
-    /// The default observation: table attitude if there is a table log, otherwise zero velocity.
+    /// The default observation: table attitude if there is a table log, zero velocity if there is none.
     pub fn aiding(&self) -> Aiding {
         match self.recording.table {
             Some(_) => Aiding::Table,

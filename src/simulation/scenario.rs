@@ -141,7 +141,7 @@ impl Scenario {
         Ok(scenario)
     }
 
-    /// A copy with an error term, which has the usual magnitude unless the models state one.
+    /// A copy with an error term, which has the typical magnitude unless the models state one.
     pub fn with_error_term(mut self, block: ErrorTerm) -> Self {
         match block {
             ErrorTerm::GaussMarkovBias => {

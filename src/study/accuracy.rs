@@ -1,5 +1,5 @@
 //! Accuracy of the filter and consistency of its σ over many simulated runs, compared with the truth, the Cramér–Rao
-//! bound, and the closed form on the static positions of the paper.
+//! bound, and the closed form on the static positions described in the paper.
 //!
 //! All values are compared in the general form and in the body frame of the table.
 

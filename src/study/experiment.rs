@@ -40,7 +40,7 @@ pub struct ExperimentStudy {
     pub trajectory: Trajectory,
     /// Name of the trajectory.
     pub trajectory_name: String,
-    /// Duration of each navigation in intervals of [`super::navigation::INTERVAL`].
+    /// Duration of each navigation run in intervals of [`super::navigation::INTERVAL`].
     pub intervals: u32,
     /// Number of instruments.
     pub samples: u64,

@@ -46,7 +46,8 @@ pub trait Study: Sync {
 
     /// A function that performs the run with a given number.
     ///
-    /// # Errors [`StudyError`] if no run can be performed.
+    /// # Errors
+    /// Returns [`StudyError`] if no run can be performed.
     fn maker(&self) -> Result<impl Fn(u64) -> Result<Self::Trial, StudyError> + Sync, StudyError>;
 
     /// The outcome of all runs, in the order of their numbers.
@@ -57,8 +58,9 @@ pub trait Study: Sync {
 
     /// Performs some of the runs on all cores; `done` is called after each and may stop the study.
     ///
-    /// # Errors [`StudyError`] if runs cannot be performed, or if the study was stopped. A run without a calibration is not an error:
-    /// it is counted.
+    /// # Errors
+    /// Returns [`StudyError`] if runs cannot be performed, or if the study was stopped. A run without a calibration is
+    /// counted and is not an error.
     fn trials(&self, runs: &[u64], done: Done) -> Result<Vec<Self::Trial>, StudyError> {
         let make = self.maker()?;
         let all = runs.par_iter().with_max_len(1).map(|&run| {

@@ -72,7 +72,7 @@ impl Motion {
     }
 }
 
-/// Motion and duration of navigation, starting from perfect alignment, with the height fixed to the true height.
+/// Motion and duration of navigation, starting from perfect alignment, with the height fixed to its true value.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mission {
     /// Motion of the body.
@@ -229,7 +229,7 @@ impl Mission {
     /// Navigation errors without σ, from the nonlinear equations; the calculation takes milliseconds for 40 h at rest.
     ///
     /// # Errors
-    /// The errors of [`Self::navigate`].
+    /// The same errors as [`Self::navigate`].
     pub fn errors(&self, pair: &Pair) -> Result<Vec<Outlook>, NavigationStudyError> {
         self.errors_from(&ErrorVector::zeros(), pair)
     }

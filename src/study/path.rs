@@ -31,9 +31,9 @@ pub struct Named<'a> {
     pub path: &'a str,
     /// The scenario; `None` for the default scenario.
     pub scenario: Option<&'a str>,
-    /// Instrument that replaces the instrument of the scenario.
+    /// Instrument to use instead of the one in the scenario.
     pub imu: Option<&'a str>,
-    /// Table that replaces the table of the scenario.
+    /// Table to use instead of the one in the scenario.
     pub table: Option<&'a str>,
     /// Whether the sensor is turned by hand, without a table; a list of moves always is.
     pub by_hand: bool,
@@ -89,7 +89,7 @@ pub enum PathError {
     /// A model cannot be read.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// The words are not moves.
+    /// The path is neither a model nor a valid list of moves.
     #[error("{0}")]
     Words(String),
     /// The table cannot follow the path.
@@ -106,7 +106,8 @@ pub enum PathError {
 impl PathStudy {
     /// Reads a path and the models that are given by name.
     ///
-    /// # Errors [`PathError`] if a model cannot be read, or the words are not moves.
+    /// # Errors
+    /// Returns [`PathError`] if a model cannot be read, or if the path is neither a model nor a valid list of moves.
     pub fn load(named: &Named) -> Result<Self, PathError> {
         let is_words = named.path.contains(',') || named.path.starts_with("turn ");
         let setting = Self::setting(&Named {
@@ -129,7 +130,8 @@ impl PathStudy {
     /// The setting of paths: the models given by name, with the path of the scenario, which the table may not be able
     /// to follow.
     ///
-    /// # Errors [`PathError`] if a model cannot be read.
+    /// # Errors
+    /// Returns [`PathError`] if a model cannot be read.
     pub fn setting(named: &Named) -> Result<Self, PathError> {
         let by_hand = named.by_hand;
         let usual = if by_hand { "mems" } else { "demo" };

@@ -32,7 +32,7 @@ pub use paper::{Installation, Kind, Reading};
 pub use quantity::{ByQuantity, Moments, QUANTITIES};
 pub use verdict::{AGREEMENT, Verdict};
 
-/// Minimum number of samples for verdicts; with this number, only the sampling error of the paper matters.
+/// Minimum number of samples for verdicts; with this number, only the sampling error in the paper matters.
 pub const POPULATION: usize = 4000;
 
 /// Number of times at which the errors of samples are stored.
@@ -80,7 +80,7 @@ pub struct Table1 {
     pub study: Table1Study,
     /// Number of samples for the verdicts; the first of these samples are the samples of the study.
     pub population: usize,
-    /// The columns of the paper, in the order of the paper.
+    /// The columns of the table in the paper, in the same order.
     pub columns: Vec<Column>,
 }
 
@@ -111,7 +111,7 @@ pub struct Row {
     pub sample: ByQuantity<Moments>,
     /// Mean and standard deviation over the population.
     pub population: ByQuantity<Moments>,
-    /// Mean of the paper minus mean of the population, in standard errors of the difference.
+    /// Mean in the paper minus mean of the population, in standard errors of the difference.
     pub difference: ByQuantity<f64>,
     /// Errors of the sensed rate (rad/s) or specific force (m/s²) along body axes, computed − true, of
     /// each sample of the study.

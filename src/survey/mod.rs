@@ -146,7 +146,8 @@ fn directions(rests: &[Rest]) -> usize {
 impl Expected {
     /// Prediction for a method.
     ///
-    /// # Errors [`CalibrationError`] if the method cannot calibrate this run.
+    /// # Errors
+    /// Returns [`CalibrationError`] if the method cannot calibrate this run.
     pub fn of(run: &Run, path: Path) -> Result<Self, CalibrationError> {
         let aiding = match path {
             Path::SixPosition => {

@@ -95,7 +95,7 @@ fn a_draft_that_nobody_completed_is_no_statement() {
     let refused = certificate.arg("--laboratory").arg(&lab).output().unwrap();
     let message = String::from_utf8_lossy(&refused.stderr);
     assert!(
-        refused.status.code() == Some(1) && message.contains("found 20 open fields"),
+        refused.status.code() == Some(1) && message.contains("found 20 incomplete fields"),
         "{message}"
     );
     // In the order of the draft, without those that the run states.

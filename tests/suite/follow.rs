@@ -289,7 +289,7 @@ fn a_kept_file_is_continued_on_a_new_line_by_rows_like_its_own() {
     let renamed = names.replacen("gx,gy", "gy,gx", 1);
     for (sent, says) in [
         (renamed + "\n" + &new, "found the columns t,gy,gx"),
-        (old.clone(), "rows that this file contains already"),
+        (old.clone(), "rows that this file already contains"),
         (
             new.replace(',', ",0,"),
             "found 13 as the number of fields, expected 7",

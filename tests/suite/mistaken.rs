@@ -74,7 +74,7 @@ fn a_rate_that_fits_no_unit_without_a_time_column_is_asked() {
     std::fs::write(place.join("imu.csv"), rows.join("\n") + "\n").unwrap();
     let message = refused(place, &["imu.csv", "--latitude", "34", "--rate", "200"]);
     assert!(
-        message.contains("at 200 Hz") && message.contains("rad/s would at about"),
+        message.contains("at 200 Hz") && message.contains("rad/s would fit at about"),
         "{message}"
     );
 }

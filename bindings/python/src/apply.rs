@@ -53,8 +53,8 @@ impl Rows<'_> {
 /// Names of six columns, outputs per row value, and rows per second.
 type Inputs = (Option<Vec<String>>, f64, f64);
 
-/// How rows are read: as stated, otherwise as in the run that was calibrated. A minus before a name reverses a column.
-/// The columns are None if neither tells.
+/// How rows are read: as stated or, if nothing is stated, as in the calibrated run. A minus sign before a name reverses a
+/// column. The columns are None if neither source gives them.
 #[pyfunction]
 pub fn inputs(
     calibration: &Calibration,

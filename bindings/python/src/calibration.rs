@@ -361,7 +361,8 @@ impl Calibration {
     /// data : DataFrame, Dataset of xarray, array of shape (rows, columns), mapping of arrays, or Run, optional
     ///     Samples as logged.
     /// gyro, accel : (x, y, z), (x, y, z, unit) or array of shape (n, 3), optional
-    ///     Columns along right, front and up; a minus before a name reverses a column. Default: the columns of the calibrated run, by name.
+    ///     Columns along right, front and up; a minus sign before a name reverses a column. Default: the
+    ///     columns of the calibrated run, by name.
     /// rate : float, optional
     ///     Rows per second, for increments and pulses. Default: the rate of the calibrated run.
     ///

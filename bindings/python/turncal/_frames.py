@@ -63,7 +63,7 @@ def run(
     data : DataFrame, Dataset of xarray, array or mapping of arrays, optional
         A row per sample. Columns of an array are numbered from 0. NaN marks a missing value.
     gyro, accel : (x, y, z), (x, y, z, unit) or array of shape (n, 3), optional
-        Columns along right, front and up; a minus before a name, such as "-gy", reverses a column. Units: "rad/s",
+        Columns along right, front and up; a minus sign before a name, such as "-gy", reverses a column. Units: "rad/s",
         "deg/s", "m/s^2", "g", the size of one count such as "1/131 deg/s", or of increments "rad", "deg", "m/s".
     time : str, int or array, optional
         Column of time; its unit is found from `rate` or from its steps. datetime64 is possible. Default: an index of

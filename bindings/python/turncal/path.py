@@ -34,8 +34,8 @@ def evaluate(
     aiding : {"table", "velocity"}, optional
         Observations of the filter. Default: table; by hand velocity.
     with_ : str or sequence of str, optional
-        "auto" (default): average over the absence and the usual sizes of every error term; "none": only K, E and D; or
-        terms to estimate in any case.
+        "auto" (default): average over the absence and the typical magnitudes of every error term; "none": only K, E
+        and D; or terms to estimate in any case.
     specification : path-like, optional
         Specification; turncal tests whether the predicted σ are small enough to decide pass or fail.
 

@@ -29,11 +29,11 @@ use turncal_report::{Document, Facts};
 
 /// Simulates a calibration and compares it with the truth
 ///
-/// Simulates an instrument with the errors of the paper on a three-axis table: ten minutes of turns for the filter, and
-/// an hour of static positions for the closed form of the paper. Calibrates the instrument with both methods, compares
-/// both calibrations with the truth, navigates for 40 h with each calibration, and writes a report. DIR itself is the
-/// run directory for the filter. DIR also contains ekf/ with the filter calibration, six-position/ with the static run
-/// and its calibration, and report/.
+/// Simulates an instrument with the sensor errors given in the paper on a three-axis table: ten minutes of turns for
+/// the filter, and an hour of static positions for the closed form described in the paper. Calibrates the instrument
+/// with both methods, compares both calibrations with the truth, navigates for 40 h with each calibration, and writes a
+/// report. DIR itself is the run directory for the filter. DIR also contains ekf/ with the filter calibration,
+/// six-position/ with the static run and its calibration, and report/.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:  turncal demo -o my-demo --seed 3")]
 pub struct Demo {

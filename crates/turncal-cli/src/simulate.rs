@@ -10,7 +10,7 @@ use crate::terminal::Activity;
 use turncal::simulation::{Scenario, Simulated, SimulatedCampaign};
 use turncal_files::{campaign_text, write_run};
 
-/// Simulates a run with known truth from a scenario, and writes its directory
+/// Simulates a run with known truth from a scenario, and writes a run directory
 ///
 /// Writes run.toml, its logs and truth.json. The scenario is a TOML file or an embedded name from turncal list.
 #[derive(Debug, clap::Args)]

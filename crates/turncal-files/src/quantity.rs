@@ -77,7 +77,7 @@ pub fn units_of_time() -> impl Iterator<Item = (&'static str, f64)> {
     of_time.map(|&(word, _, per_si, _)| (word, per_si.recip()))
 }
 
-/// The unit in a text: the name in `run.toml`, the multiple of this unit, and the quantity.
+/// The unit in a string: the name in `run.toml`, the multiple of this unit, and the quantity.
 pub fn spelled(text: &str) -> Option<(&'static str, f64, Of)> {
     let text = normalised(text);
     let has = |spellings: &[&str]| spellings.contains(&text.as_str());

@@ -55,7 +55,7 @@ const KINDS: [(&str, &str); 4] = [
 /// The text to which spans refer.
 #[derive(Clone, Copy)]
 pub struct Document<'a> {
-    /// The file name used in errors.
+    /// The file name shown in error messages.
     pub file: &'a Path,
     /// Text.
     pub text: &'a str,

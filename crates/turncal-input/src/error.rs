@@ -199,7 +199,7 @@ fn likeness(name: &str, other: &str) -> f64 {
     strsim::normalized_damerau_levenshtein(&name.to_lowercase(), &other.to_lowercase())
 }
 
-/// `Did you mean … ?`, otherwise the given advice.
+/// `Did you mean … ?` if a candidate is similar enough; if not, the given advice.
 pub fn suggestion<'a>(
     name: &str,
     candidates: impl IntoIterator<Item = &'a str>,
@@ -214,7 +214,7 @@ pub fn suggestion<'a>(
 /// Maximum number of characters of candidate names shown.
 const ROOM: usize = 2 * LONGEST;
 
-/// All candidate names if they fit into the message; otherwise the most similar names and the number of the others.
+/// All candidate names if they fit into the message; if not, the most similar names and the number of the others.
 pub fn choice<'a>(wanted: &str, names: impl IntoIterator<Item = &'a str>) -> String {
     let names: Vec<&str> = names.into_iter().collect();
     let all = list(names.iter().copied());

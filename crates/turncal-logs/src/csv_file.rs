@@ -186,7 +186,7 @@ impl CsvFile {
     }
 }
 
-/// The error for a text whose first line shows another kind of file.
+/// The error for a text file with a first line that shows another kind of file.
 fn not_rows(file: &DataFile, lines: &Lines, is_labelled: bool) -> Option<FileError> {
     let first = lines.ahead().next()?.text.trim_ascii_start();
     let is_array = first.starts_with(b"[{") || first.trim_ascii_end() == b"[";

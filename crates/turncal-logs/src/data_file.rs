@@ -52,8 +52,8 @@ impl DataFile {
         }
     }
 
-    /// The file in memory with the name of this path, if there is one (files in memory have no directory); otherwise
-    /// the file on disk.
+    /// The file in memory with the name of this path, if there is one (files in memory have no directory); if not, the
+    /// file on disk.
     pub fn find(path: PathBuf, in_memory: &[Self]) -> Self {
         let found = in_memory
             .iter()

@@ -9,7 +9,7 @@ use turncal_input::{FileColumn, FileError, Place};
 
 /// A file that provides rows of numbers in sequence.
 pub trait Rows {
-    /// The file name used in errors.
+    /// The file name shown in error messages.
     fn file(&self) -> &Path;
 
     /// The names of the columns.
@@ -48,7 +48,7 @@ pub trait Rows {
         self.value(column).is_nan()
     }
 
-    /// Line number of a text, or sample number of another file.
+    /// Line number in a text file, or sample number in another file.
     fn line(&self) -> u64;
 
     /// The place of the row, or of a column in the row.

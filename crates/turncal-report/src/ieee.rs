@@ -1,4 +1,4 @@
-//! The values of a calibration by the terms of IEEE Std 1293 (accelerometers) and IEEE Std 952 and 647 (gyros).
+//! The values of a calibration in the notation of IEEE Std 1293 (accelerometers) and IEEE Std 952 and 647 (gyros).
 
 use crate::prelude::*;
 use turncal::calibration::Calibration;
@@ -36,18 +36,18 @@ pub fn table(calibration: &Calibration) -> Table {
         rows.collect::<Vec<_>>()
     });
     Table::new(
-        "Values by the terms of IEEE Std 1293 and 952",
+        "Values in the notation of IEEE Std 1293 and 952",
         columns("term | x | y | z | unit | definition"),
     )
     .sections(sections)
     .note(
-        "In parentheses: 1σ in units of the last digit. Accelerometers, in g: output = K₁ (K₀ + a_i + K₁′/2 |a_i| + \
-         K₂ a_i² + K₃ a_i³ + δ_o a_p − δ_p a_o + K_ip a_i a_p + K_io a_i a_o + K_po a_p a_o). i: input axis; p and o: \
-         the two next axes in the order x, y, z, x.",
+        "In parentheses: 1σ in units of the last digit. Accelerometers, in g: output = K₁ (K₀ + a_i + K₁′/2 |a_i| + K₂ \
+         a_i² + K₃ a_i³ + δ_o a_p − δ_p a_o + K_ip a_i a_p + K_io a_i a_o + K_po a_p a_o). i: input axis; p and o: the \
+         next two axes in the order x, y, z, x.",
     )
     .note(
         "Gyros: input rate = S × output. S₊, S₋: positive and negative rates. K, E, D and q: the parameters of \
-         turncal, by the names of calibration.json.",
+         turncal, named as in calibration.json.",
     )
 }
 

@@ -45,7 +45,8 @@ struct NotShown {
     what: String,
     /// Remaining part of the prior σ.
     remaining: f64,
-    /// Change caused by an error term of usual size, relative to the σ of the group; the largest over all groups.
+    /// Change caused by an error term of typical magnitude, relative to the σ of the group; the largest over all
+    /// groups.
     change_in_sigma: Option<f64>,
     shown_by: String,
 }
@@ -272,8 +273,8 @@ fn table(all: &[NotShown]) -> Table {
     )
     .section(all.iter().map(row))
     .note(
-        "Combinations of parameters, and error terms that are not estimated, whose σ stays above half of the prior \
-         σ. Could change: RMS change, in units of σ, of the group that a term of usual size affects most.",
+        "Combinations of parameters, and error terms that are not estimated, whose σ stays above half of the prior σ. \
+         Could change: RMS change, in units of σ, of the group that a term of typical magnitude affects most.",
     )
 }
 

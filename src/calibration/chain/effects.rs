@@ -65,13 +65,13 @@ pub struct Sizes {
 }
 
 impl Sizes {
-    /// A copy in which an effect has another variance.
+    /// A copy in which an effect has a different variance.
     pub fn with(mut self, effect: Effect, factor: f64) -> Self {
         self.effects.insert(effect, factor);
         self
     }
 
-    /// A copy in which an event has another variance.
+    /// A copy in which an event has a different variance.
     pub fn with_event(mut self, effect: Effect, event: usize, factor: f64) -> Self {
         self.events.insert((effect, event), factor);
         self

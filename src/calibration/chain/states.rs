@@ -33,7 +33,7 @@ pub struct States {
     pub gravity: Option<usize>,
     /// State of each quantity that differs between recordings.
     pub own: Vec<(usize, OwnState)>,
-    /// Number of all states.
+    /// Total number of states.
     pub count: usize,
 }
 

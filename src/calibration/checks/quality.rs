@@ -186,8 +186,8 @@ impl Outcome {
 impl ClosedForm {
     /// The quality of this calibration of a problem.
     ///
-    /// For labelled sections, cross-validation uses the dwells without a label; otherwise every other dwell, as in
-    /// [`Outcome::quality`].
+    /// For labelled sections, cross-validation uses the dwells without a label; in all other cases, every other dwell,
+    /// as in [`Outcome::quality`].
     ///
     /// # Errors
     /// Returns [`CalibrationError`] if the closed form belongs to a different problem.

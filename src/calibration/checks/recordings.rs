@@ -22,7 +22,8 @@ pub struct RecordingDifference {
 }
 
 impl RecordingDifference {
-    /// The difference of a group, given the logarithm of its size over the usual size; the test is not filled in.
+    /// The difference of a group, given the logarithm of its size divided by its typical magnitude; the test is not
+    /// filled in.
     pub(in crate::calibration) fn new(
         group: Group,
         model: &Model,

@@ -28,7 +28,7 @@ pub struct TermEvidence {
     pub present: f64,
     /// Whether the data show the term although it was not requested (false-alarm rate 1 in 1000 recordings).
     pub shown: bool,
-    /// Largest remaining part of the usual size of the term, from 0 (known) to 1 (not shown by the recording).
+    /// Largest remaining part of the typical magnitude of the term, from 0 (known) to 1 (not shown by the recording).
     pub remaining: f64,
     /// RMS σ of each of [`Group::all`] with the term, divided by RMS σ if the term were known to be absent; `None` if
     /// the group has no σ.

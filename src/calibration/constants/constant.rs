@@ -65,7 +65,7 @@ impl Constant {
         }
     }
 
-    /// Prior 1σ of a constant or, if the constant may be absent, its usual size; zero if the constant is off.
+    /// Prior 1σ of a constant or, if the constant may be absent, its typical magnitude; zero if the constant is off.
     pub fn sigma(self, model: &Model) -> f64 {
         let stated = match self {
             Self::Parameter(index) => model.prior_sigma[index],
@@ -93,7 +93,7 @@ impl Constant {
         }
     }
 
-    /// Usual size as a parameter of an error term.
+    /// Typical magnitude as a parameter of an error term.
     fn usual_size(self, term: ErrorTerm, model: &Model) -> f64 {
         match (term, self) {
             (ErrorTerm::Instrument(of), _) => of.usual_size(&model.noise),

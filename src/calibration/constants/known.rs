@@ -86,7 +86,7 @@ impl Known {
     }
 
     /// Returns the RMS change of the parameters of both triads due to the candidates at these positions, each with its
-    /// usual size; and the largest remaining fraction of this size if all other candidates are absent.
+    /// typical magnitude; and the largest remaining fraction of this magnitude if all other candidates are absent.
     pub fn effect_of(&self, places: &[usize]) -> Option<(ParameterVector, f64)> {
         let (n, m) = (self.open.len(), self.prior.candidates);
         let all = self.prior.sigma.len();
@@ -185,7 +185,7 @@ impl Known {
 }
 
 impl Sites {
-    /// Fixes all constants at their prior mean, to a millionth of their usual size.
+    /// Fixes all constants at their prior mean, to a millionth of their typical magnitude.
     pub fn certain(prior: &Prior) -> Self {
         let (n, m) = (prior.sigma.len(), prior.candidates);
         let information = prior

@@ -13,7 +13,8 @@ pub struct Prior {
     /// The constants, those that may be absent last.
     pub constants: Vec<Constant>,
     pub mean: DVector<f64>,
-    /// 1σ of each constant; zero for constants fixed at their mean. For constants that may be absent, their usual size.
+    /// 1σ of each constant; zero for constants fixed at their mean. For constants that may be absent, their typical
+    /// magnitude.
     pub sigma: DVector<f64>,
     /// Number of constants that may be absent.
     pub candidates: usize,

@@ -26,7 +26,7 @@ pub struct NoiseReport {
     pub sources: Vec<SourceFigures>,
 }
 
-/// Test whether the stated noise agrees with the estimated noise.
+/// Test of whether the stated noise agrees with the estimated noise.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct NoiseTest {
     /// The largest squared distance of a stated figure from the estimate: logarithm of the ratio, in units of its σ.

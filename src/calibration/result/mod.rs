@@ -62,7 +62,8 @@ pub struct Calibration {
     /// Unit of the file's quantity, such as `count`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<PerSensor<String>>,
-    /// Quantity in a row of the file. For rates, N is the row; otherwise, N is the row divided by the sample period.
+    /// Quantity in a row of the file. For rates, N is the row; for increments and pulses, N is the row divided by the
+    /// sample period.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub output: Option<Output>,
     /// Columns of the log along x, y and z of each triad, with a minus sign if the sign is reversed.
@@ -224,7 +225,8 @@ pub struct GravityRecord {
 pub enum Method {
     /// Extended Kalman filter that uses the whole run
     Ekf,
-    /// Closed form from table positions, otherwise from labelled sections, otherwise from gravity
+    /// Closed form from table positions; without a table log, from labelled sections or, if there are none, from
+    /// gravity
     SixPosition,
 }
 
@@ -275,7 +277,7 @@ pub struct BlockRecord {
     /// Probability that the term is present.
     #[serde(default)]
     pub present: f64,
-    /// Largest remaining part of the usual size of the term, from 0 (known) to 1 (not shown).
+    /// Largest remaining part of the typical magnitude of the term, from 0 (known) to 1 (not shown).
     #[serde(default)]
     pub remaining: f64,
     /// σ with the term divided by σ without the term, for gyro K, E, D and accel K, E, D; `None` if there is no σ.
@@ -302,7 +304,8 @@ impl Word {
 
 /// `calibration["gyro.bias.x"]`: a parameter by name, in the file's quantity, as [`Calibration::get`].
 ///
-/// # Panics If there is no parameter with that name, as with a map; `get` does not panic.
+/// # Panics
+/// Panics if there is no parameter with that name, as with a map; `get` does not panic.
 impl Index<&str> for Calibration {
     type Output = f64;
 

@@ -14,9 +14,9 @@ const ONE_TEMPERATURE: f64 = 1.0;
 /// Span over which a parameter usually changes by as much as an instrument of its grade differs from another: the
 /// −40 to 85 °C of data sheets, K.
 const SPECIFIED: f64 = 125.0;
-/// Usual change due to each further order, relative to that of the preceding order.
+/// Typical change due to each further order, relative to that of the preceding order.
 const HIGHER: f64 = 1.0 / 3.0;
-/// Usual lag of the temperature of the sensing element, s.
+/// Typical lag of the temperature of the sensing element, s.
 const LAG: f64 = 60.0;
 
 /// Options for the temperature dependence of parameters.

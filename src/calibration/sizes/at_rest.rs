@@ -23,12 +23,12 @@ const RATE: f64 = 1e-3;
 const FORCE: f64 = 0.03;
 /// Degrees of freedom of the prior of a dwell's variance relative to all dwells.
 const BEFOREHAND: f64 = 6.0;
-/// Smallest log of a size over the usual one: noise a hundred times smaller than usual is only rounding.
+/// Smallest log of a size divided by the typical one: noise a hundred times smaller than usual is only rounding.
 const LEAST: f64 = -4.605_170_185_988_091;
 
 /// The noise at rest.
 pub struct NoiseAtRest {
-    /// Logarithms of the common sizes divided by the usual sizes.
+    /// Logarithms of the common sizes divided by the typical magnitudes.
     pub logs: DVector<f64>,
     /// 1σ of each logarithm.
     pub sigma: DVector<f64>,

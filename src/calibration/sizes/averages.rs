@@ -1,17 +1,18 @@
 //! Average over effects that may be absent and whose size is not known, such as error terms and temperature orders.
 //!
-//! A group of constants is absent with a prior probability, usually one half; otherwise it has its usual size, known to
-//! a factor of three. The posterior of all constants is the average over these cases. With many groups, the average is found as in
-//! expectation propagation (Minka 2001, "Expectation propagation for approximate Bayesian inference", UAI 17): each
-//! group gets the normal prior about zero for which its mean equals that of the average over its own cases, given the
-//! priors of all others. The covariance is then the covariance within the cases plus the covariance between the cases.
+//! A group of constants is absent with a prior probability, usually one half; if it is present, it has its typical
+//! magnitude, known to a factor of three. The posterior of all constants is the average over these cases. With many
+//! groups, the average is found as in expectation propagation (Minka 2001, "Expectation propagation for approximate
+//! Bayesian inference", UAI 17): each group gets the normal prior about zero for which its mean equals that of the
+//! average over its own cases, given the priors of all others. The covariance is then the covariance within the cases
+//! plus the covariance between the cases.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use crate::calibration::constants::{Information, inverse};
 
-/// Sizes over the usual one: every half power of three up to the factor 3^(3/2), with triangular weights over their
-/// logarithms.
+/// Sizes divided by the typical one: every half power of three up to the factor 3^(3/2), with triangular weights over
+/// their logarithms.
 const SIZES: [(f64, f64); 7] = [
     (0.192_450_089_729_875_26, 1.0 / 16.0),
     (0.333_333_333_333_333_3, 2.0 / 16.0),
@@ -21,9 +22,9 @@ const SIZES: [(f64, f64); 7] = [
     (3.0, 2.0 / 16.0),
     (5.196_152_422_706_632, 1.0 / 16.0),
 ];
-/// The largest size divided by the usual size.
+/// The largest size divided by the typical magnitude.
 pub const LARGEST: f64 = SIZES[6].0;
-/// Smallest variance of a prior: an absent constant is zero to a millionth of its usual size.
+/// Smallest variance of a prior: an absent constant is zero to a millionth of its typical magnitude.
 const NOTHING: f64 = 1e-12;
 /// Prior probability that a group is absent, if nothing is known.
 pub const ABSENT: f64 = 0.5;
@@ -32,7 +33,7 @@ const ROUNDS: usize = 100;
 /// The average has settled if no probability of absence changes by more than this.
 const SETTLED: f64 = 1e-5;
 
-/// The average over all cases of groups of constants, in units of their usual sizes.
+/// The average over all cases of groups of constants, in units of their typical magnitudes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Average {
     /// Inverse covariance of each group's normal prior, block by block.
@@ -53,8 +54,8 @@ struct Moments {
 }
 
 impl Average {
-    /// A starting point in which every group is present, with this size divided by the usual size, and with its prior
-    /// probability of absence.
+    /// A starting point in which every group is present, with this size divided by the typical magnitude, and with its
+    /// prior probability of absence.
     pub fn begun(groups: &[Vec<usize>], sizes: &[f64], prior_absent: Vec<f64>) -> Self {
         let n = groups.iter().map(Vec::len).sum();
         let mut precision = DMatrix::zeros(n, n);

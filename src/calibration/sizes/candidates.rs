@@ -6,7 +6,7 @@ use super::averages::{ABSENT, Average};
 use crate::calibration::constants::{Information, Sites};
 use crate::calibration::{Candidate, Constant, Known, Model, Prior};
 
-/// Initial size of a term over its usual size.
+/// Initial size of a term divided by its typical magnitude.
 const NEXT_TO_ABSENT: f64 = 0.01;
 
 /// Constants that may be absent, in groups, with the average over their cases.
@@ -99,7 +99,7 @@ impl Candidates {
 }
 
 /// Starts terms almost absent, because all of them together could explain everything else, and orders of temperature
-/// with their usual sizes, because nothing else explains the effect of warming.
+/// with their typical magnitudes, because nothing else explains the effect of warming.
 fn begun(all: &[Candidate], places: &[Vec<usize>]) -> Average {
     let size = |of: &Candidate| match of {
         Candidate::Order(..) => 1.0,
@@ -114,7 +114,7 @@ fn begun(all: &[Candidate], places: &[Vec<usize>]) -> Average {
     Average::begun(places, &sizes, all.iter().map(absent).collect())
 }
 
-/// Usual size of each constant that may be absent, and its value at the linearisation point.
+/// Typical magnitude of each constant that may be absent, and its value at the linearisation point.
 fn usual_and_values(prior: &Prior) -> (DVector<f64>, DVector<f64>) {
     let (n, m) = (prior.sigma.len(), prior.candidates);
     (

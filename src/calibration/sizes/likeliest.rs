@@ -23,7 +23,7 @@ const LONGEST: f64 = 1.0;
 /// Sizes of effects and of single events.
 #[derive(Debug, Clone)]
 pub struct At {
-    /// Logarithms of σ divided by the usual σ with which the links were made.
+    /// Logarithm of the σ of each effect, relative to the typical σ that was assumed when the links were made.
     pub logs: DVector<f64>,
     /// Variances of single events, divided by the variances of their effects.
     pub events: Sizes,
@@ -43,12 +43,12 @@ pub struct Here<'a> {
 pub struct Search<'a> {
     pub chain: &'a Chain,
     pub prior: &'a Prior,
-    /// Effects whose sizes are estimated, with the usual sizes with which the links were made.
+    /// Effects whose sizes are estimated, with the typical magnitudes that were assumed when the links were made.
     pub usual: &'a [Usual],
 }
 
 impl<'a> Search<'a> {
-    /// Variances, divided by the variances with which the links were made.
+    /// Variance of each effect, relative to the variance that was assumed when the links were made.
     pub fn sizes(&self, at: &At) -> Sizes {
         let pairs = self.usual.iter().zip(&at.logs);
         pairs.fold(at.events.clone(), |sizes, (of, by)| match of.effect() {
@@ -165,8 +165,8 @@ impl Here<'_> {
 }
 
 impl At {
-    /// The usual sizes, with slips as large as position errors. The search thus first tries a slip that explains as
-    /// much as all later positions, and reduces the size if slips are not needed (graduated non-convexity: Blake and
+    /// The typical magnitudes, with slips as large as position errors. The search thus first tries a slip that explains
+    /// as much as all later positions, and reduces the size if slips are not needed (graduated non-convexity: Blake and
     /// Zisserman, *Visual Reconstruction*, ch. 7).
     pub fn usual(usual: &[Usual], chain: &Chain) -> Self {
         let drives = chain.links.iter().flat_map(|link| &link.transition.drives);

@@ -35,7 +35,7 @@ const SETTLED: f64 = 0.1;
 #[derive(Debug, Clone, Copy)]
 struct Size {
     usual: Usual,
-    /// Log of the size over the usual size, and its 1σ.
+    /// Log of the size over the typical magnitude, and its 1σ.
     log: f64,
     sigma: f64,
 }
@@ -250,8 +250,8 @@ impl Effects {
         anew.weighed(chain, problem, script)
     }
 
-    /// Variances, divided by the variances with which the links of a chain are made; with stated noise, slips are
-    /// excluded.
+    /// Variance of each effect, relative to the variance that was assumed when the links of the chain were made. If the
+    /// noise is stated, slips are excluded.
     pub fn sizes(&self, chain: &Chain) -> Sizes {
         if self.at_rest.is_empty() && self.between.is_empty() {
             let slips = chain.states.slips.is_some();
@@ -269,7 +269,7 @@ impl Effects {
         })
     }
 
-    /// Sets the noise at rest in a model, and all other effects to these logs over their usual sizes.
+    /// Sets the noise at rest in a model, and all other effects to these logs over their typical magnitudes.
     fn set(&self, model: &mut Model, log: impl Fn(&Size) -> f64) {
         self.at_rest
             .iter()

@@ -1,4 +1,4 @@
-//! Usual sizes of effects with their priors.
+//! Typical magnitudes of effects with their priors.
 
 use crate::calibration::chain::Effect;
 use crate::calibration::model::SETTLING_TIME;
@@ -13,7 +13,7 @@ pub const LOG_SIGMA: f64 = 1.098_612_288_668_109_8;
 const LOG_SIGMA_NOT_STATED: f64 = std::f64::consts::LN_10;
 /// Default correlation time of a bias, s.
 const CORRELATION_TIME: f64 = 100.0;
-/// Usual differences between recordings, divided by the prior σ of an instrument.
+/// Typical differences between recordings, divided by the prior σ of an instrument.
 const DIFFERENCE: f64 = 0.1;
 
 /// A quantity whose size is estimated.
@@ -27,11 +27,11 @@ pub enum What {
     Difference(Group),
 }
 
-/// A usual size with its prior.
+/// A typical magnitude with its prior.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Usual {
     pub what: What,
-    /// Usual size in SI units and radians; for a difference, a fraction of the prior σ of each parameter.
+    /// Typical magnitude in SI units and radians; for a difference, a fraction of the prior σ of each parameter.
     pub sigma: f64,
     /// 1σ of its logarithm.
     pub spread: f64,
@@ -40,8 +40,8 @@ pub struct Usual {
 }
 
 impl Usual {
-    /// The usual sizes of every source that a problem can have, and of the differences between its recordings; `moves`
-    /// scales the noise of moves.
+    /// The typical magnitudes of every source that a problem can have, and of the differences between its recordings;
+    /// `moves` scales the noise of moves.
     pub fn all(problem: &Problem, moves: &Moves) -> Vec<Self> {
         let sources = Source::ALL.into_iter();
         let sources = sources.filter_map(|source| Self::of(source, problem, moves));
@@ -112,7 +112,7 @@ impl Usual {
         }
     }
 
-    /// Sets the size in a model, as a logarithm relative to the usual size.
+    /// Sets the size in a model, as a logarithm relative to the typical magnitude.
     pub fn set(&self, model: &mut Model, by: f64) {
         let sigma = self.sigma * by.exp();
         match self.what {

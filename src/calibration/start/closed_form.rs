@@ -76,10 +76,11 @@ impl ClosedForm {
 
 /// Calibrates both triads of a run without a filter.
 ///
-/// With a table log, the closed form uses the dwells: the six positions of the paper for a triad (Earth rate or gravity
-/// along each body axis, in both directions) if present, otherwise all dwells. Without a table, the closed form uses
-/// labelled sections or, without labels, every dwell and turn with gravity as the only reference. For exactly opposite
-/// positions, least squares gives the half sums and half differences of the paper.
+/// With a table log, the closed form uses the dwells: the six positions that the paper describes for a triad (Earth
+/// rate or gravity along each body axis, in both directions) if the run contains them, or all dwells if not. Without a
+/// table, the closed form uses labelled sections or, without labels, every dwell and turn with gravity as the only
+/// reference. For exactly opposite positions, least squares gives the half sums and half differences stated in the
+/// paper.
 ///
 /// # Errors
 /// Returns [`CalibrationError`] if there is no dwell. Parameters that the positions do not determine keep their prior

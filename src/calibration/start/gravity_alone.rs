@@ -258,7 +258,7 @@ impl Positions<'_> {
     }
 }
 
-/// Adds the usual bias variation where none is stated: no dwell averages it out.
+/// Adds the typical bias variation where none is stated: no dwell averages it out.
 fn with_bias_variation(problem: &Problem, mut rests: Vec<Vec<AtRest>>) -> Vec<Vec<AtRest>> {
     if problem.options.noise == NoisePolicy::Stated {
         return rests;

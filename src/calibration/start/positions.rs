@@ -239,7 +239,7 @@ fn in_a_plane(equations: &Equations) -> bool {
 }
 
 /// Estimates one triad from positions without common errors, by least squares for `A = K C` and `D` row by row; the
-/// misalignment form then splits A. Returns the triad and the covariance of its parameters; Returns `None` if there are
+/// misalignment form then splits A. Returns the triad and the covariance of its parameters; returns `None` if there are
 /// fewer than four positions, or if the positions leave a row undetermined.
 pub fn six_position_triad(
     positions: &[Position],

@@ -9,7 +9,7 @@ pub const ENTRY: TermEntry = TermEntry {
     name: "accel-cross-coupling",
     title: "accel cross coupling",
     help: "Accelerometers: products of the specific forces along two axes",
-    adds: "q times the product of these two components of f is added to f along its axis",
+    adds: "q times the product of these two components of f to f, along its axis",
     shown_by: "dwells with two axes 45° up",
     // Accelerometer, then the components that are multiplied.
     parameters: (

@@ -8,7 +8,7 @@ pub const ENTRY: TermEntry = TermEntry {
     name: "accel-second-order",
     title: "accel second order",
     help: "Accelerometers: square of specific force",
-    adds: "adds q f^2 to f, along its axis",
+    adds: "q f^2 to f, along its axis",
     shown_by: "dwells with each axis up, down, level and at 45°",
     sensor: Sensor::Accel,
     unit: ("µg/g²", MICRO_G / (STANDARD_GRAVITY * STANDARD_GRAVITY)),

@@ -8,7 +8,7 @@ pub const ENTRY: TermEntry = TermEntry {
     name: "accel-third-order",
     title: "accel third order",
     help: "Accelerometers: third power of specific force",
-    adds: "adds q f^3 to f, along its axis",
+    adds: "q f^3 to f, along its axis",
     shown_by: "dwells with each axis up, level and at 45°",
     sensor: Sensor::Accel,
     unit: (

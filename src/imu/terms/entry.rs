@@ -29,7 +29,8 @@ pub struct TermEntry {
     pub title: &'static str,
     /// Description in the help of commands.
     pub help: &'static str,
-    /// Formula of the term: the quantity that a parameter q adds to specific force f or angular rate w.
+    /// Formula of the term, which follows the word "adds": what a parameter q adds to specific force f or angular rate
+    /// w.
     pub adds: &'static str,
     /// Moves or dwells that show the term, if a path does not.
     pub shown_by: &'static str,

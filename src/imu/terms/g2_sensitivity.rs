@@ -13,14 +13,14 @@ pub const ENTRY: TermEntry = TermEntry {
     name: "g2-sensitivity",
     title: "gyro g²-sensitivity",
     help: "Gyros: square of specific force",
-    adds: "q f^2 along its axis to w",
+    adds: "q f^2 to w, along its axis",
     shown_by: "long dwells with each axis up, down and level",
     sensor: Sensor::Gyro,
     unit: ("°/h/g²", DEG_PER_H / (STANDARD_GRAVITY * STANDARD_GRAVITY)),
     si_unit: "(rad/s)/(m/s^2)^2",
     d_si_unit: "\\radian\\second\\tothe{3}\\metre\\tothe{-2}",
     // A wheel of mass M and angular momentum H on stiffnesses whose compliances differ by ΔC drifts by M² ΔC g² / H:
-    // with 50 g, 0.1 kg m²/s and 2 % of 10⁻⁶ m/N this is 0.01 °/h. The usual σ is ten times this value.
+    // with 50 g, 0.1 kg m²/s and 2 % of 10⁻⁶ m/N this is 0.01 °/h. The typical σ is ten times this value.
     usual_sigma: 0.1,
     largest: REFERENCE_RATE / (STANDARD_GRAVITY * STANDARD_GRAVITY),
     parameters: ("gyro.g2_sensitivity", &PER_AXIS),

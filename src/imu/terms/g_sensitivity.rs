@@ -8,7 +8,7 @@ pub const ENTRY: TermEntry = TermEntry {
     name: "g-sensitivity",
     title: "gyro g-sensitivity",
     help: "Gyros: sensitivity to specific force",
-    adds: "Q f to w, this the row and column of Q",
+    adds: "Q f to w, where q is one element of the matrix Q",
     shown_by: "long dwells with each axis up and down",
     sensor: Sensor::Gyro,
     unit: ("°/h/g", DEG_PER_H / STANDARD_GRAVITY),

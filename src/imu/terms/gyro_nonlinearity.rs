@@ -8,7 +8,7 @@ pub const ENTRY: TermEntry = TermEntry {
     name: "gyro-nonlinearity",
     title: "gyro nonlinearity",
     help: "Gyros: scale factor that changes with the magnitude of the angular rate",
-    adds: "q |w| w / r (odd quadratic), q w^3 / r^2 (third order) along its axis to w, r = 100 deg/s",
+    adds: "q |w| w / r (odd quadratic) or q w^3 / r^2 (third order) to w, along its axis, with r = 100 deg/s",
     shown_by: "turns about each axis at three rates",
     parameters: (
         "gyro",

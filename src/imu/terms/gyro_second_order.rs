@@ -8,7 +8,7 @@ pub const ENTRY: TermEntry = TermEntry {
     name: "gyro-second-order",
     title: "gyro second order",
     help: "Gyros: square of angular rate",
-    adds: "q w^2 / r along its axis to w, r = 100 deg/s",
+    adds: "q w^2 / r to w, along its axis, with r = 100 deg/s",
     shown_by: "turns both ways about each axis, at two rates",
     unit: ("ppm at 100 °/s", PPM),
     parameters: ("gyro.second_order", &PER_AXIS),

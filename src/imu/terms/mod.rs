@@ -123,7 +123,7 @@ impl Term {
         entry.usual_sigma * entry.unit.1
     }
 
-    /// Usual size of each parameter in an instrument with this noise, in SI units. This is the size in precise
+    /// Typical magnitude of each parameter in an instrument with this noise, in SI units. This is the size in precise
     /// instruments times the ratio of the white noise of the triad to that of precise instruments. Lever arms and
     /// delays do not depend on the class of instrument.
     pub fn usual_size(self, noise: &PerSensor<Noise>) -> f64 {

@@ -9,7 +9,7 @@ pub const ENTRY: TermEntry = TermEntry {
     name: "size-effect",
     title: "accel lever arm",
     help: "Accelerometers: lever arms between the three sensors",
-    adds: "its row of ([w' x] + [w x]^2) r to f, r the lever arm",
+    adds: "its row of ([w' x] + [w x]^2) r to f, where r is the lever arm",
     shown_by: "fast turns about each axis",
     sensor: Sensor::Accel,
     unit: ("mm", 1e-3),

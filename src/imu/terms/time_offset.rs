@@ -11,7 +11,7 @@ pub const ENTRY: TermEntry = TermEntry {
     name: "time-offset",
     title: "accel time offset",
     help: "Accelerometers: delay of the accelerometer samples relative to the gyro samples",
-    adds: "-q w x f to f, accelerometers sampled later",
+    adds: "-q w x f to f, because the accelerometers are sampled later",
     shown_by: "fast turns about horizontal axes",
     sensor: Sensor::Accel,
     unit: ("ms", 1e-3),

@@ -1,4 +1,4 @@
-//! A segment at its place in time, with its motion.
+//! A segment with its start time and its motion.
 
 use nalgebra::{Vector2, Vector3};
 
@@ -11,7 +11,7 @@ use crate::units::STANDARD_GRAVITY;
 const SPEED: usize = 0;
 const HEIGHT: usize = 2;
 
-/// A segment at its place in time; quantities are speed, heading and height, in this order.
+/// A segment with its start time. All arrays contain speed, heading and height, in this order.
 #[derive(Debug, Clone, Copy)]
 pub struct Leg {
     start: f64,

@@ -7,8 +7,8 @@ use std::ops::Range;
 
 use fill::{Fill, MOST};
 
-/// Polynomials tried: degree, and samples used from either side. Each further polynomial must agree with the best one
-/// so far at the hole itself, because its test stretches are farther away.
+/// Polynomials tried: degree, and samples used from each side. Each further polynomial must agree with the best one so
+/// far at the gap itself, because its test stretches are farther away.
 const CANDIDATES: [(usize, usize); 12] = [
     (1, 1),
     (1, 2),
@@ -23,11 +23,11 @@ const CANDIDATES: [(usize, usize); 12] = [
     (3, 32),
     (1, MOST),
 ];
-/// Polynomials for a hole at the start or end of the recording.
+/// Polynomials for a gap at the start or end of the recording.
 const ONE_SIDED: [(usize, usize); 4] = [(0, 1), (0, 4), (0, 16), (0, MOST)];
-/// A hole and its neighbours may span this many times their own length, other holes included.
+/// A gap and its neighbours may span this many times their own length, other gaps included.
 const REACH: usize = 4;
-/// Number of σ within which two ways to fill a hole agree.
+/// Number of σ within which two ways to fill a gap agree.
 const AGREE: f64 = 3.0;
 
 /// The interpolations available for a range of faulty samples, on any axis.
@@ -43,8 +43,8 @@ pub struct Hole<'a> {
 }
 
 impl<'a> Hole<'a> {
-    /// A hole that consists of these samples; `sound` marks the usable samples of the record. No error is stated for a
-    /// hole longer than `longest`.
+    /// A gap that consists of these samples; `sound` marks the usable samples of the record. No error is stated for a
+    /// gap longer than `longest`.
     pub fn new(sound: &'a [bool], samples: Range<usize>, longest: usize) -> Self {
         let sides = [
             neighbours(sound, (0..samples.start).rev(), samples.len()),
@@ -68,10 +68,10 @@ impl<'a> Hole<'a> {
         }
     }
 
-    /// Fills the hole on an axis. Returns the mean square error of the sum over the hole; `None` if it is unknown.
+    /// Fills the gap on an axis. Returns the mean square error of the sum over the gap; `None` if it is unknown.
     ///
     /// `rounding` is the mean square of this error that rounding to whole steps can cause. If the errors are as small
-    /// as this, the choice of the best fill depends on the individual steps next to the hole. Among pulses that are
+    /// as this, the choice of the best fill depends on the individual steps next to the gap. Among pulses that are
     /// mostly zero, for example, a fill without any pulse seems free of error, but is biased by whole pulses. In this
     /// case, the widest fill is used for any values, because it is linear in the values and therefore unbiased.
     pub fn fill(&self, axis: &mut [f64], rounding: f64) -> Option<f64> {
@@ -181,7 +181,7 @@ fn neighbours(sound: &[bool], outwards: impl Iterator<Item = usize>, hole: usize
         .collect()
 }
 
-/// A tested fill of a hole.
+/// A tested fill of a gap.
 struct Trial<'a> {
     fill: &'a Fill,
     sum: f64,

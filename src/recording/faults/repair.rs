@@ -11,10 +11,10 @@ use crate::imu::Sensor;
 use crate::recording::ColumnFacts;
 use crate::units::DEGREE;
 
-/// Longest hole that is bridged, s: a longer one may hide a whole move from dwell to dwell, without any sign at its
+/// Longest gap that is bridged, s: a longer one may hide a whole move from dwell to dwell, without any sign at its
 /// edges.
 const LONGEST: f64 = 0.5;
-/// A hole counts as short compared with a hole this many times as long.
+/// A gap counts as short compared with a gap this many times as long.
 const SHORT: usize = 8;
 /// Largest attitude error that a linear filter can handle, rad.
 const WORST_ANGLE: f64 = 0.2 * DEGREE;
@@ -84,7 +84,7 @@ impl Rows<'_> {
         faults
     }
 
-    /// Bridges the holes that columns share, short ones first; the remaining faults are marked as not bridged.
+    /// Bridges the gaps that columns share, short ones first; the remaining faults are marked as not bridged.
     fn fill(
         &self,
         Holes { of, mut sound }: Holes,
@@ -97,7 +97,7 @@ impl Rows<'_> {
         let mut filled = 0;
         let mut bridges = Vec::new();
         for (number, samples) in holes.iter().enumerate() {
-            // Next to a long hole, short holes that are filled count as good samples.
+            // Next to a long gap, short gaps that are filled count as good samples.
             while filled < number && SHORT * holes[filled].len() <= samples.len() {
                 sound[holes[filled].clone()].fill(true);
                 filled += 1;
@@ -185,14 +185,14 @@ impl Rows<'_> {
     }
 }
 
-/// Columns with the same holes.
+/// Columns with the same gaps.
 struct Holes {
     of: Vec<usize>,
     /// Whether each sample is usable.
     sound: Vec<bool>,
 }
 
-/// Groups columns with the same holes: missing rows affect all columns.
+/// Groups columns with the same gaps: missing rows affect all columns.
 fn holes_of_columns(faults: &[Fault], body_axes: &[usize; 6], samples: usize) -> Vec<Holes> {
     let mut all: Vec<Holes> = Vec::new();
     for (k, &axis) in body_axes.iter().enumerate() {

@@ -1,5 +1,5 @@
-//! The baseline of the comparison: the closed form on the static positions of the paper, with the same instrument and
-//! noise.
+//! The baseline of the comparison: the closed form on the static positions described in the paper, with the same
+//! instrument and noise.
 
 use crate::calibration::{
     Options, ParameterVector, Problem, in_body_frame, in_general_form, six_position_of, to_vector,

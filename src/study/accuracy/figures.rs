@@ -17,13 +17,13 @@ pub struct Figures {
     pub bound: f64,
     /// RMS error of the filter divided by the bound.
     pub ratio: Option<Ratio>,
-    /// RMS error of the closed form in its own time.
+    /// RMS error of the closed form with its full table time.
     pub closed_form: Option<f64>,
-    /// RMS error of the closed form in its own time, divided by that of the filter.
+    /// RMS error of the closed form with its full table time, divided by that of the filter.
     pub gain: Option<Ratio>,
-    /// RMS error of the closed form in the table time of the filter; `None` if this time is too short.
+    /// RMS error of the closed form with the table time of the filter; `None` if this time is too short.
     pub closed_form_in_equal_time: Option<f64>,
-    /// RMS error of the closed form in the table time of the filter, divided by that of the filter.
+    /// RMS error of the closed form with the table time of the filter, divided by that of the filter.
     pub gain_in_equal_time: Option<Ratio>,
 }
 

@@ -36,9 +36,9 @@ pub struct Position {
     pub filter: Option<(Vector2<f64>, Matrix2<f64>)>,
     /// Covariance of the bound.
     pub bound: Matrix2<f64>,
-    /// Error of the closed form in its own time.
+    /// Error of the closed form with its full table time.
     pub closed_form: Option<Vector2<f64>>,
-    /// Error of the closed form in the filter's time.
+    /// Error of the closed form with the table time of the filter.
     pub closed_form_in_equal_time: Option<Vector2<f64>>,
 }
 

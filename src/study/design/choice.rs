@@ -11,9 +11,9 @@ use super::{DesignStudy, TURN, USUAL_TIME};
 use crate::calibration::Estimate;
 use crate::study::path::PathError;
 
-/// Numbers of turns in the usual time among which the dwells of a first path are chosen.
+/// Numbers of turns in the typical time among which the dwells of a first path are chosen.
 const TURNS: [f64; 3] = [14.0, 22.0, 32.0];
-/// Number of corrections of the dwells, because the goals are for σ of joined legs.
+/// Number of corrections of the dwells; they are needed because the goals refer to the σ of joined legs.
 const CORRECTIONS: usize = 6;
 /// Smallest difference between dwells, s.
 const HUNDREDTH: f64 = 0.01;
@@ -70,7 +70,7 @@ impl DesignStudy {
         }))
     }
 
-    /// What is to be small: the time if limits are decided, otherwise σ.
+    /// The figure to minimise: the time if limits are decided, the σ in all other cases.
     fn cost(&self, search: &Search, goals: &Goals, of: &Candidate) -> f64 {
         let cost = goals.cost(&of.estimate.sigma());
         let is_decided = goals.worst(&of.estimate.sigma()) <= DECIDED;

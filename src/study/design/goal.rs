@@ -8,7 +8,7 @@ const POWER: i32 = 16;
 /// A ratio whose square is below this gains little from a better path.
 const ENOUGH: f64 = 0.1;
 
-/// Parameters with the RMS σ that is wanted.
+/// Parameters with the desired RMS σ.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Goal {
     pub parameters: Vec<usize>,
@@ -47,7 +47,7 @@ impl Goals {
         Self(limits.map(goal).collect())
     }
 
-    /// σ over the σ wanted.
+    /// σ divided by the desired σ.
     fn ratios<'a>(&'a self, sigma: &'a ParameterVector) -> impl Iterator<Item = f64> + 'a {
         let goals = self.0.iter();
         goals.map(|goal| rms(&goal.parameters, sigma) / goal.sigma)
@@ -70,7 +70,7 @@ impl Goals {
         ratios.map(|ratio| (ratio * ratio + ENOUGH).ln()).sum()
     }
 
-    /// The goals for σ that are in error by the same factors as `approximate`.
+    /// The goals for σ with the same relative errors as `approximate`.
     pub fn corrected(&self, approximate: &ParameterVector, exact: &ParameterVector) -> Self {
         let goals = self.0.iter().map(|goal| {
             let [approximate, exact] = [approximate, exact].map(|of| rms(&goal.parameters, of));

@@ -18,7 +18,7 @@ const PERIOD: f64 = 0.1;
 /// The legs made so far.
 pub struct Legs<'a> {
     pub machine: Machine<'a>,
-    /// Setting of every path.
+    /// The setting common to all paths.
     pub study: PathStudy,
     start: AttitudePrior,
     before: Journey,
@@ -28,7 +28,7 @@ pub struct Legs<'a> {
 }
 
 impl<'a> Legs<'a> {
-    /// No legs yet, in the setting of a study whose path gives the prior of the first attitude.
+    /// An empty set of legs, in the setting of a study; the path of the study gives the prior of the first attitude.
     pub fn new(machine: Machine<'a>, study: &PathStudy) -> Result<Self, PathError> {
         let mut study = study.clone();
         study.scenario.integrator.period = PERIOD;
@@ -85,7 +85,7 @@ impl<'a> Legs<'a> {
         Ok(())
     }
 
-    /// Expected σ of a path with dwells of this duration in s, whose legs are made.
+    /// Expected σ of a path with dwells of this duration in s; its legs must already exist.
     pub fn sigma(&self, turns: &[Turn], dwell: f64) -> Option<ParameterVector> {
         let mut journey = self.before.clone();
         let mut place = self.machine.start();

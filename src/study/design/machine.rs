@@ -29,7 +29,7 @@ const BETWEEN: [i32; 5] = [45, -45, 90, -90, 180];
 /// Full turns, in degrees.
 const FULL: [i32; 2] = [360, -360];
 
-/// What turns the instrument.
+/// The machine or person that turns the instrument.
 #[derive(Debug, Clone, Copy)]
 pub enum Machine<'a> {
     Table(&'a Table),
@@ -160,7 +160,7 @@ impl Machine<'_> {
         }
     }
 
-    /// Quarter turns about every axis, twice.
+    /// Two quarter turns about every axis.
     pub fn tour(&self) -> Vec<Turn> {
         let turns = self.turns().into_iter();
         let quarters = turns.filter(|turn| turn.degrees.iter().sum::<i32>() == 90);
@@ -168,8 +168,9 @@ impl Machine<'_> {
         [&once[..], &once].concat()
     }
 
-    /// Turns of which some are replaced. The attitudes of a table after the next turn remain: this turn goes there from
-    /// the new attitude. By hand, where a turn is about one axis, all later attitudes change.
+    /// Turns of which some are replaced. On a table, the attitudes after the next turn do not change: the next turn
+    /// starts from the new attitude and ends at the old one. By hand, where a turn is about one axis, all later
+    /// attitudes change.
     pub fn spliced(&self, turns: &[Turn], range: Range<usize>, by: &[Turn]) -> Vec<Turn> {
         let mut spliced = turns[..range.start].to_vec();
         spliced.extend_from_slice(by);

@@ -11,12 +11,12 @@ use crate::study::path::PathError;
 
 /// Shortest dwell of a designed path, s.
 pub const SHORTEST_DWELL: f64 = 5.0;
-/// Most turns of a path.
+/// Maximum number of turns in a path.
 const MOST_TURNS: usize = 32;
-/// Most legs that the exchange makes, and most paths that it tries.
+/// Maximum number of legs that the exchange makes, and of paths that it tries.
 const MOST_LEGS: usize = 1500;
 const MOST_PATHS: usize = 2500;
-/// Smallest part of its cost by which an exchange improves a path.
+/// Smallest relative decrease of the cost that counts as an improvement.
 const WORTH: f64 = 1e-3;
 
 /// A search for the best path within a time in s.
@@ -118,7 +118,7 @@ impl<'a, 'm> Search<'a, 'm> {
         Some(self.goals.cost(&sigma??))
     }
 
-    /// Paths that differ at one place: a turn is replaced, inserted, removed, or exchanged with the next.
+    /// Paths that differ in one turn: a turn is replaced, inserted, removed, or exchanged with the next.
     fn changed(&self, turns: &[Turn], at: usize) -> Vec<Vec<Turn>> {
         let machine = &self.legs.machine;
         let mut changed = Vec::new();
@@ -154,7 +154,7 @@ impl<'a, 'm> Search<'a, 'm> {
     }
 }
 
-/// Place of the smallest figure, the first if several are equal.
+/// Index of the smallest figure; the first index if several figures are equal.
 fn best(figures: impl Iterator<Item = Option<f64>>) -> Option<usize> {
     let known = figures.enumerate();
     let known = known.filter_map(|(place, figure)| Some((place, figure?)));

@@ -16,14 +16,14 @@ const SHORTEST: f64 = 1.0;
 pub struct Shipped {
     /// Name of the path.
     pub name: &'static str,
-    /// Factor of its dwells.
+    /// Factor by which its dwells are scaled.
     pub factor: f64,
-    /// Expected σ; `None` if its moves alone need too much time.
+    /// Expected σ; `None` if the moves alone take too long.
     pub estimate: Option<Estimate>,
 }
 
 impl Shipped {
-    /// The paths that a machine can follow, in this time in s.
+    /// The paths that a machine can follow, scaled to this time in s.
     pub fn all(setting: &PathStudy, time: f64) -> Result<Vec<Self>, PathError> {
         let names: Vec<&str> = models::names(Room::Path).collect();
         let all = names.into_par_iter().filter_map(|name| {

@@ -12,7 +12,7 @@ use crate::simulation::{Scenario, Simulated};
 use crate::study::StudyError;
 use crate::turntable::TableError;
 
-/// The static positions of the paper, used by the closed form.
+/// The static positions described in the paper, used by the closed form.
 pub(super) const POSITIONS: &str = "six-position";
 /// A filter path with the table time of the closed form.
 const HOUR_PATH: &str = "three-axis-hour";
@@ -20,7 +20,7 @@ const HOUR_PATH: &str = "three-axis-hour";
 /// An estimator and its path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum Estimator {
-    /// The closed form on the static positions of the paper.
+    /// The closed form on the static positions described in the paper.
     #[serde(rename = "six-position")]
     ClosedForm,
     /// The filter on the path of the scenario.

@@ -24,7 +24,7 @@ pub enum Verdict {
     NotReproducible(Option<&'static Reading>),
 }
 
-/// Mean of the paper minus mean of a population of `n` samples, in standard errors of the difference: `(m_paper − m) /
+/// Mean in the paper minus mean of a population of `n` samples, in standard errors of the difference: `(m_paper − m) /
 /// (s √(1/50 + 1/n))`, with the standard deviation of the population for both samples.
 pub fn difference(paper: &Moments, population: &Moments, n: usize) -> f64 {
     let error = population.std * (1.0 / SAMPLES as f64 + 1.0 / n as f64).sqrt();

@@ -19,7 +19,8 @@ pub const METHODS: [Choice<Method>; 2] = [
     ),
     (
         "six-position",
-        "Closed form from table positions, otherwise from labelled sections, otherwise from gravity",
+        "Closed form from table positions; without a table log, from labelled sections or, if there are none, from \
+         gravity",
         Method::SixPosition,
     ),
 ];

@@ -23,9 +23,9 @@ pub struct Estimation {
     /// Observations used by the filter [default: table if the run has a table log, otherwise velocity]
     #[arg(long, value_parser = one_of(&AIDINGS))]
     aiding: Option<Aiding>,
-    /// Error terms to estimate in addition to those switched on in run.toml. auto: average over each term being absent
-    /// or having one of its usual sizes; none: only K, E and D; or names of terms that are always estimated [default:
-    /// auto]
+    /// Error terms to estimate in addition to those switched on in run.toml. auto: average over the absence and the
+    /// typical magnitudes of every other term; none: only K, E and D; or names of terms that are always estimated
+    /// [default: auto]
     #[arg(long, value_name = "TERM", value_parser = with_value(), value_delimiter = ',')]
     #[serde(serialize_with = "With::names")]
     with: Vec<With>,

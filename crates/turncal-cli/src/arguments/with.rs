@@ -10,7 +10,7 @@ use turncal::calibration::ErrorTerm;
 /// A value of `--with`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum With {
-    /// Every error term, averaged over being absent and having its usual sizes.
+    /// Every error term, averaged over its absence and its typical magnitudes.
     Auto,
     /// K, E and D alone.
     None,
@@ -74,7 +74,7 @@ impl With {
 pub fn with_value() -> impl TypedValueParser<Value = With> {
     let words = [
         PossibleValue::new("auto")
-            .help("Every error term, averaged over being absent and having its usual sizes"),
+            .help("Every error term, averaged over its absence and its typical magnitudes"),
         PossibleValue::new("none").help("K, E and D alone"),
     ];
     let values = words.into_iter().chain(ErrorTerm::ALL.map(listed));

@@ -56,7 +56,9 @@ impl Continued {
 
     /// Checks that the first lines of a source continue this file.
     ///
-    /// # Errors If no line is a row of the same kind, if the column names differ, or if the file already contains all rows.
+    /// # Errors
+    /// Returns an error if no line is a row of the same kind, if the column names differ, or if the file already
+    /// contains all rows.
     pub fn check(&self, first: &[Vec<u8>]) -> anyhow::Result<()> {
         let log = self.log.display();
         let lines = first.iter().filter(|line| !is_remark(line));
@@ -79,7 +81,7 @@ impl Continued {
         }
         if rows.len() > 1 && rows.iter().all(|row| self.head.contains(row)) {
             bail!(
-                "{log}: found rows that this file contains already, expected new rows. Choose another file"
+                "{log}: found rows that this file already contains, expected new rows. Choose another file"
             );
         }
         Ok(())

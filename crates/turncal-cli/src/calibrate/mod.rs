@@ -111,8 +111,8 @@ pub struct Calibrate {
     /// Calibrate part i of M of a lot; turncal merge combines the parts
     #[arg(long, value_name = "i/M", value_parser = shard, requires = "output", conflicts_with_all = ["json", "truth"], help_heading = "Advanced")]
     shard: Option<Shard>,
-    /// Follow a growing log, - or a serial device: show the current accuracy and the next move, and calibrate when the
-    /// specification can be decided, when no more rows arrive, or when Ctrl-C is pressed
+    /// Follow a growing log, standard input (-) or a serial device: show the current accuracy and the next move, and
+    /// calibrate when the specification can be decided, when no more rows arrive, or when Ctrl-C is pressed
     #[arg(long, conflicts_with_all = ["shard", "temperature", "truth"], help_heading = FOLLOWING)]
     follow: bool,
     /// File in which rows from standard input (-) or a device are saved; if the file exists, it must contain rows of
@@ -123,7 +123,7 @@ pub struct Calibrate {
     /// there, which must not exist yet
     #[arg(long, value_name = "RUN.toml", requires = "follow", conflicts_with = "keep", value_parser = run_file, help_heading = FOLLOWING)]
     run: Option<PathBuf>,
-    /// Time in s without growth after which a followed file counts as complete
+    /// Time in s after which a followed file that has not grown counts as complete
     #[arg(long, value_name = "S", requires = "follow", value_parser = seconds, default_value = "30", help_heading = FOLLOWING)]
     patience: Duration,
     /// Print the calibration, or the evaluation of the lot, as a single JSON document, without any other output

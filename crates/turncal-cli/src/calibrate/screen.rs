@@ -11,7 +11,7 @@ use turncal::survey::Status;
 use turncal_report::session;
 use turncal_report::terminal::{printable, wrapped};
 
-/// Form of the output: on a terminal, a screen that is redrawn; otherwise, one line for each dwell.
+/// Form of the output: on a terminal, a screen that is redrawn; in a file or a pipe, one line for each dwell.
 pub struct Screen {
     is_terminal: bool,
     silent: bool,

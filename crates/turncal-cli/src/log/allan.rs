@@ -13,7 +13,8 @@ use turncal_report::allan;
 ///
 /// Shows the overlapping Allan deviation of every axis with its confidence interval; the coefficients of random walk,
 /// bias instability, rate random walk, quantisation and ramp (with σ if detected, otherwise as an upper limit); and an
-/// [imu.noise] table for run.toml. Uses the whole recording if it is stationary, otherwise its longest static interval.
+/// [imu.noise] table for run.toml. Uses the whole recording if it is stationary; if not, uses the longest static
+/// interval.
 #[derive(Debug, clap::Args)]
 #[command(mut_arg("output", |output| output.help("Directory for the report and figures")))]
 #[command(after_help = "Examples:

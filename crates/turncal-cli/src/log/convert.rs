@@ -23,7 +23,7 @@ pub struct Convert {
     output: PathBuf,
     #[command(flatten)]
     of_log: OfLog,
-    /// Use the intact part of a damaged log, up to the first damage
+    /// Use a damaged log up to the first damaged part
     #[arg(long)]
     salvage: bool,
     #[command(flatten)]

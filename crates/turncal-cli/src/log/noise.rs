@@ -21,7 +21,7 @@ pub struct Noise {
     /// Noise figure to convert
     #[arg(value_name = "VALUE", allow_negative_numbers = true, value_parser = positive)]
     value: f64,
-    /// Unit of the figure, or its name in a program
+    /// Unit of the figure, or the name of its parameter in a program such as Kalibr
     #[arg(value_name = "UNIT")]
     unit: String,
     /// Sample rate in Hz, to convert noise per sample

@@ -15,11 +15,11 @@ use turncal_report::path::{Report, in_words, moves_in_words};
 
 /// Designs a path for a table or for a sensor turned by hand
 ///
-/// Searches turns within the limits of the table axes, or turns by hand about body axes, and dwells between them: turns
-/// between faces, edges and corners of a cube, and full turns at several rates. With a specification, the path is the
-/// shortest one found that decides every limit; otherwise, it uses the whole time to make every group of parameters
-/// better than on the embedded paths. Error terms of --with are estimated too. The exit status is 3 if the σ are too
-/// large to decide a limit.
+/// Searches for the best sequence of turns and dwells: turns between the faces, edges and corners of a cube, and full
+/// turns at several rates, within the limits of the table axes or by hand about body axes. With a specification, the
+/// path is the shortest one found that decides every limit. Without a specification, the path uses the whole time to
+/// determine every group of parameters better than the embedded paths do. The terms given with --with are estimated
+/// too. The exit status is 3 if the σ are too large to decide a limit.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal path design --time 524 -o mine.toml
@@ -31,7 +31,7 @@ use turncal_report::path::{Report, in_words, moves_in_words};
 pub struct Design {
     #[command(flatten)]
     setting: Setting,
-    /// Longest time of the path in s, from 60 s [default: 600; with a specification: 3600]
+    /// Maximum duration of the path in s, at least 60 [default: 600; with a specification: 3600]
     #[arg(long, value_name = "S", value_parser = seconds)]
     time: Option<Duration>,
     /// Path file to write
@@ -40,7 +40,7 @@ pub struct Design {
     /// Replace the path file if it exists
     #[arg(long)]
     force: bool,
-    /// Print the results as one JSON document and nothing else
+    /// Print the results as a single JSON document, without any other output
     #[arg(long)]
     json: bool,
 }

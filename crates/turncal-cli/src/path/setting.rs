@@ -29,8 +29,8 @@ pub struct Setting {
     /// Observations used by the filter [default: table; by hand: velocity]
     #[arg(long, value_parser = one_of(&AIDINGS))]
     pub aiding: Option<Aiding>,
-    /// Error terms to estimate. auto: average over each term being absent or having one of its usual sizes; none: only
-    /// K, E and D; or names of terms that are always estimated [default: auto]
+    /// Error terms to estimate. auto: average over the absence and the typical magnitudes of every term; none: only K,
+    /// E and D; or names of terms that are always estimated [default: auto]
     #[arg(long, value_name = "TERM", value_parser = with_value(), value_delimiter = ',')]
     pub with: Vec<With>,
     /// Specification; turncal tests whether the predicted σ are small enough to decide pass or fail

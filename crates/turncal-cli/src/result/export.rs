@@ -14,9 +14,9 @@ use turncal_files::write_whole;
 ///
 /// For formats whose inputs are in rad/s and m/s², the file states the number by which to divide the raw output. This
 /// number is the nominal scale of the unit; for counts, it is the nominal scale of --run or, without --run, the
-/// calibrated scale factor rounded to three digits. The verdict of the calibration, and the parts of it that the format
-/// cannot represent, are stated in the file and on standard error (for realsense, which has no place for text, only on
-/// standard error).
+/// calibrated scale factor rounded to three digits. The verdict of the calibration, and the parts of the calibration
+/// that the format cannot represent, are stated in the file and on standard error (for realsense, which has no place
+/// for text, only on standard error).
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal export result/calibration.json --format c -o imu.h

@@ -19,10 +19,10 @@ const LARGEST_PITCH: f64 = 89.0;
 
 /// Shows the navigation error caused by the errors of a calibration
 ///
-/// Simulates navigation at rest or along a trajectory with the instrument of --truth, whose output is corrected with
-/// the calibration. Navigation starts with perfect alignment, and the height is held at the true height. Shows the
-/// errors of attitude, velocity and position, and the σ of these errors predicted from the covariance of the
-/// calibration. Without --force, turncal refuses a calibration whose verdict is FAILED.
+/// Simulates an instrument with the true parameters in --truth, at rest or along a trajectory. Corrects its output with
+/// the calibration, and navigates with the corrected data. Navigation starts with perfect alignment, and the height is
+/// fixed to its true value. Shows the errors of attitude, velocity and position, and the σ of these errors predicted
+/// from the covariance of the calibration. Without --force, turncal refuses a calibration whose verdict is FAILED.
 #[derive(Debug, clap::Args)]
 #[command(mut_arg("output", |output| output.help("Directory for navigation.csv, figures and a page")))]
 #[command(after_help = "Examples:

@@ -19,10 +19,10 @@ use turncal_report as report;
 /// Tests the accuracy of the filter and the consistency of its σ
 ///
 /// Simulates many runs, each with a different instrument, noise and table errors, and calibrates each run with the
-/// filter and, using the static positions of the paper, with the closed form. Shows the RMS error of each parameter
-/// group, and of the position after 40 h of navigation, compared with the Cramér–Rao bound and with the closed form.
-/// Also shows whether the σ of the filter are consistent with its errors (NEES, NIS, fraction of position errors within
-/// the predicted σ). The results include runs in which the filter fails.
+/// filter and, using the static positions described in the paper, with the closed form. Shows the RMS error of each
+/// parameter group, and of the position after 40 h of navigation, compared with the Cramér–Rao bound and with the
+/// closed form. Also shows whether the σ of the filter are consistent with its errors (NEES, NIS, fraction of position
+/// errors within the predicted σ). The results include runs in which the filter fails.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal study accuracy --runs 500
@@ -44,7 +44,8 @@ pub struct Accuracy {
     /// Misalignment form of the filter
     #[arg(long, value_parser = one_of(&FORMS), default_value = "general")]
     installation: InstallationForm,
-    /// Installation of the simulated instruments: a TOML file or an embedded name [default: from the scenario]
+    /// Misalignment of the simulated instruments: an installation file (TOML) or an embedded name [default: from the
+    /// scenario]
     #[arg(long, value_name = "MODEL")]
     truth_installation: Option<String>,
     /// Error terms to simulate and to estimate, in addition to those of the scenario [default: auto]

@@ -15,13 +15,13 @@ use turncal_report as report;
 const HOUR: f64 = 3600.0;
 const SCENARIO: &str = "experiment";
 
-/// Simulates the turntable experiment of the paper, and shows the navigation accuracy after each calibration
+/// Simulates the turntable experiment described in the paper, and shows the navigation accuracy after each calibration
 ///
 /// Simulates many instruments with noise and Gauss–Markov biases, on a table with position errors. Calibrates each
-/// instrument in all misalignment forms: with the closed form, which uses the static positions of the paper; with the
-/// filter, which uses one sixth of that table time; and with the filter in the full table time. Then navigates with the
-/// remaining errors, both at rest (with self-alignment or perfect alignment) and in motion. Shows the position error
-/// for every method, and the parameters that cause the error.
+/// instrument in all misalignment forms and with three methods: the closed form on the static positions described in
+/// the paper, the filter in one sixth of the table time of these positions, and the filter in the full table time. Then
+/// navigates with the remaining errors, both at rest (with self-alignment or perfect alignment) and in motion. Shows
+/// the position error for every method, and the parameters that cause the error.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal study experiment

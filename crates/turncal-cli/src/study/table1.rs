@@ -11,8 +11,7 @@ use turncal_report as report;
 ///
 /// Draws random misalignment angles as in the paper, calibrates gyros and accelerometers without noise (closed form,
 /// six-angle and three-angle form), and navigates with the remaining errors. Shows the largest errors next to the
-/// published figures, for each interpretation of the text of the paper, and states which figures a correct program
-/// reproduces.
+/// published figures, for each interpretation of the paper, and states which figures a correct program reproduces.
 #[derive(Debug, clap::Args)]
 #[command(mut_arg("output", |output| output.help("Directory for a report with Figures 2 to 9 of the paper")))]
 #[command(after_help = "Examples:

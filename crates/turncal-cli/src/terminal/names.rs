@@ -3,7 +3,7 @@
 use std::ffi::OsStr;
 use std::path::Path;
 
-/// Returns the file stems if they differ, otherwise the directory names if these differ, otherwise the whole paths.
+/// Returns the file stems if they differ; if not, the directory names; if these do not differ either, the whole paths.
 pub fn short_names(paths: &[&Path]) -> Vec<String> {
     let shown = |name: &OsStr| name.to_string_lossy().into_owned();
     let stem = |path: &Path| path.file_stem().map(shown);

@@ -38,7 +38,8 @@ fn in_colour(word: Word) -> String {
     format!("\u{1b}[1;{colour}m{word}\u{1b}[0m")
 }
 
-/// Width of standard output: the width of its terminal, otherwise COLUMNS, otherwise unlimited.
+/// Width of standard output: the width of its terminal; without a terminal, the value of COLUMNS; without both,
+/// unlimited.
 pub fn columns() -> Option<u16> {
     let terminal = terminal_size::terminal_size_of(io::stdout()).map(|(width, _)| width.0);
     terminal.or_else(|| std::env::var("COLUMNS").ok()?.parse().ok())

@@ -104,7 +104,8 @@ impl LotDirectory {
 
     /// Stores a unit; `write` adds further files to its directory.
     ///
-    /// # Errors The error of `write`, or [`FileError`] if the unit cannot be written.
+    /// # Errors
+    /// Returns the error of `write`, or [`FileError`] if the unit cannot be written.
     pub fn put<E: From<FileError>>(
         &self,
         unit: &Unit,

@@ -60,7 +60,9 @@ pub struct Parts {
 impl Parts {
     /// Reads the job records in several directories.
     ///
-    /// # Errors [`FileError`] if a directory is not a part, if the parts belong to different jobs, or if a run is missing or is in two parts.
+    /// # Errors
+    /// Returns [`FileError`] if a directory is not a part, if the parts belong to different jobs, or if a run is
+    /// missing or is in two parts.
     pub fn read(directories: &[PathBuf]) -> Result<Self, FileError> {
         let read = |directory: &PathBuf| Ok((directory.clone(), Part::read(directory)?));
         let parts: Result<Vec<_>, FileError> = directories.iter().map(read).collect();

@@ -74,8 +74,9 @@ impl WholeDirectory {
 
     /// Moves the directory into place, with a list of its entries in the file `.turncal`.
     pub fn commit(self) -> Result<(), FileError> {
-        let list = manifest::of_all(&self.path())
-            .map_err(|error| unwritable(self.stage.target(), "put the output in place", &error))?;
+        let list = manifest::of_all(&self.path()).map_err(|error| {
+            unwritable(self.stage.target(), "move the output into place", &error)
+        })?;
         self.commit_with(&list)
     }
 
@@ -92,7 +93,7 @@ impl WholeDirectory {
             only_output(target)?;
         }
         fs::write(self.path().join(manifest::FILE), list)
-            .map_err(|error| unwritable(target, "put the output in place", &error))?;
+            .map_err(|error| unwritable(target, "move the output into place", &error))?;
         self.stage.commit(self.force)
     }
 }

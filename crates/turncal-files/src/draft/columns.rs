@@ -203,7 +203,7 @@ pub fn standing_time(sheet: &Sheet) -> Option<(&str, f64)> {
     Some((name.as_str(), *values.first()?))
 }
 
-/// The first column with the name of a time that falls from row to row.
+/// The first column with the name of a time whose values decrease from row to row.
 pub fn falling_time(sheet: &Sheet) -> Option<&str> {
     let falls = |k: &usize| {
         let is_text = sheet.units[*k] == "h:m:s";

@@ -47,7 +47,7 @@ impl Draft {
         error.map_or(Ok(()), Err)
     }
 
-    /// The first open field that prevents a run: what is unknown, why, and the remedy.
+    /// The first unknown field that prevents a run: what is unknown, why, and the remedy.
     fn open_question(&self) -> Option<[String; 3]> {
         let (_, remarks) = self.run_file("log");
         let (field, why) = remarks.open.into_iter().next()?;

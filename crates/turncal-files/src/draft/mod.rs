@@ -1,4 +1,4 @@
-//! A draft of `run.toml` for a log that has none: detected fields with reasons, and open fields for the user to
+//! A draft of `run.toml` for a log that has none: detected fields with reasons, and unknown fields for the user to
 //! complete.
 
 mod columns;
@@ -309,7 +309,8 @@ impl Draft {
                     rounded(at_rest, 3)
                 ),
                 "gravity".to_owned(),
-                "Log accelerations with gravity, not linear or user accelerations.".to_owned(),
+                "Log the acceleration including gravity, not the linear or user acceleration."
+                    .to_owned(),
             ]
         })
     }
@@ -363,7 +364,7 @@ pub fn turned_angle(triads: PerSensor<Vec<Vector3<f64>>>, period: f64) -> Option
 fn no_time(sheet: &Sheet, columns: &Columns, clock: &Clock) -> Option<[String; 3]> {
     if let Some(name) = columns::falling_time(sheet).filter(|_| columns.time.is_none()) {
         return Some([
-            format!("times in the column `{name}` that fall from row to row"),
+            format!("times in the column `{name}` that decrease from row to row"),
             "times that increase".to_owned(),
             "The newest row is first: reverse the rows below the names.".to_owned(),
         ]);

@@ -47,7 +47,7 @@ pub fn is_of_autopilot(columns: &[String]) -> bool {
     has("accelerometer_m_s2[0]") || has("TimeUS") && (has("GyrX") || has("AccX"))
 }
 
-/// The unit in a text, with an optional preceding factor.
+/// The unit in a string, with an optional preceding factor.
 pub fn unit(text: &str) -> Option<Unit> {
     let text = text.trim_matches(['[', ']', ' ']);
     let text = text.strip_suffix("/LSB").unwrap_or(text);
@@ -158,7 +158,7 @@ impl Name {
         self.unit.is_some_and(is_magnetic) || OTHERS.iter().any(|other| self.stem.contains(other))
     }
 
-    /// How similar the name is to the usual name of a time column; larger means more similar.
+    /// How similar the name is to the typical name of a time column; larger means more similar.
     pub fn is_time(&self) -> u8 {
         let whole = self.whole();
         let has = |parts: &[&str]| parts.iter().any(|part| whole.contains(part));

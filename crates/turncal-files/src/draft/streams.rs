@@ -69,7 +69,7 @@ struct Member {
 }
 
 impl Streams {
-    /// Examines a log; returns `None` for a text with a single stream.
+    /// Examines a log; returns `None` for a text file with a single stream.
     pub fn of_file(
         file: &DataFile,
         wanted: Option<&str>,
@@ -414,7 +414,7 @@ fn names(found: &Found) -> Vec<String> {
     bare.iter().map(|name| format!("{stream}.{name}")).collect()
 }
 
-/// The streams of a text whose rows are distinguished by tags; empty for other texts.
+/// The streams of a text file with tagged rows; empty for other text files.
 fn tagged(file: &DataFile) -> Result<Vec<Member>, FileError> {
     let of_tag = |tag: String| {
         let source = Source {
@@ -426,9 +426,13 @@ fn tagged(file: &DataFile) -> Result<Vec<Member>, FileError> {
             let name = &sheet.names[column];
             return Err(FileError::of(
                 file,
-                format_args!("several instruments in the rows `{tag}`, by the column `{name}`"),
+                format_args!(
+                    "several instruments in the rows `{tag}`, distinguished by the column `{name}`"
+                ),
                 "the rows of one instrument",
-                &format!("Keep the rows of one, such as those with {name} = {number}."),
+                &format!(
+                    "Keep only the rows of one instrument, such as those with {name} = {number}."
+                ),
             ));
         }
         let mut member = Member::of_stream(file, rows_as_stream(&tag, &sheet));
@@ -457,7 +461,7 @@ fn tagged(file: &DataFile) -> Result<Vec<Member>, FileError> {
     members.into_iter().collect()
 }
 
-/// Rows of a text as a stream.
+/// Rows of a text file as a stream.
 fn rows_as_stream(name: &str, sheet: &Sheet) -> Found {
     let column = |(name, unit): (&String, &String)| {
         let unit = Name::of_column(name, unit).unit;

@@ -224,7 +224,7 @@ fn registers_without_names_and_time_are_told_by_their_numbers() {
         &text,
         &[
             "columns = { gyro = [\"4\", \"5\", \"6\"], accel = [\"1\", \"2\", \"3\"] }",
-            "# TODO: no column increases steadily, as a time does",
+            "# TODO: no column increases steadily, as time stamps do",
         ],
     );
 }
@@ -447,7 +447,8 @@ fn a_counter_that_other_packets_share_is_no_time_and_a_compass_no_gyro() {
     has(
         &text,
         &[
-            "# a counter shared with other packets cannot serve as a time; the sample period is estimated from the turns",
+            "# a counter shared with other packets cannot serve as a time column; the sample period is estimated from \
+             the turns",
             "columns = { gyro = [\"%float(RawGyroX)\", \"%float(RawGyroY)\", \"%float(RawGyroZ)\"], \
              accel = [\"%float(RawAccelX)\", ",
         ],

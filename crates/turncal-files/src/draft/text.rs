@@ -1,4 +1,4 @@
-//! The draft as the fields of `run.toml`, with reasons and open fields.
+//! The draft as the fields of `run.toml`, with reasons and with the fields that the user must complete.
 
 use std::collections::BTreeMap;
 
@@ -35,7 +35,7 @@ impl Draft {
             None => "the log alone".to_owned(),
         };
         let remark = format_args!(
-            "Draft made from {of_it}. Check the guesses and complete the open fields; then run `turncal check`."
+            "Draft made from {of_it}. Check the guesses and complete the fields marked TODO; then run `turncal check`."
         );
         remarks.before("format", remark);
         let run = RunFile {
@@ -70,7 +70,7 @@ impl Draft {
             value
         };
         let (of, latitude) = (&self.stated, "north positive; 0.1° is accurate enough");
-        let gravity = "if measured; otherwise turncal uses normal gravity";
+        let gravity = "measured gravity; if this field is omitted, turncal uses normal gravity";
         SiteFile {
             latitude_deg: field("latitude_deg", of.latitude_deg, latitude).map(Latitude),
             height_m: field("height_m", of.height_m, "above the ellipsoid").map(Height),
@@ -118,7 +118,7 @@ impl Draft {
             );
         }
         remarks.reason("imu.time_unit", &clock.why);
-        let why = "guess: a row covers the interval that ends at its time stamp; otherwise \"start\" or \"middle\"";
+        let why = "guess: a row covers the interval that ends at its time stamp; if not, set \"start\" or \"middle\"";
         remarks.reason("imu.time_stamp", why);
         remarks.reason("imu.continuous", self.why_continuous());
         let why = "the log contains several instruments; this value selects the first";
@@ -207,9 +207,7 @@ impl Draft {
             remarks.reason(path, AXES_OF_PROGRAM);
             return axes;
         }
-        let mut why =
-            "guess: x right, y front, z up; otherwise set this field to \"frd\" or \"flu\""
-                .to_owned();
+        let mut why = "guess: x right, y front, z up; if not, set \"frd\" or \"flu\"".to_owned();
         if is_of_autopilot(&self.columns.names) {
             why += "; the column names are those of PX4 or ArduPilot, which use \"frd\"";
         }

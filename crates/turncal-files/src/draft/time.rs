@@ -73,7 +73,7 @@ impl Clock {
     pub fn find(sheet: &Sheet, columns: &mut Columns) -> Self {
         let stated = sheet.rate.map(f64::recip);
         let Some((column, stamps)) = columns.time.zip(columns.stamps(sheet)) else {
-            return Self::without(stated, "no column increases steadily, as a time does");
+            return Self::without(stated, "no column increases steadily, as time stamps do");
         };
         let steps = Steps::of(&stamps);
         let name = Name::of_column(&sheet.names[column], &sheet.units[column]);
@@ -81,7 +81,7 @@ impl Clock {
             columns.time = None;
             return Self::without(
                 stated,
-                "a counter shared with other packets cannot serve as a time",
+                "a counter shared with other packets cannot serve as a time column",
             );
         }
         let Tick {
@@ -94,7 +94,8 @@ impl Clock {
         let is_open = !is_named && !is_known && name.is_in_ticks();
         let doubt_of_ticks = is_open.then(|| {
             format!(
-                "The length of a tick in the column `{}` is not stated. turncal assumed the most usual one. State --rate.",
+                "The length of a tick in the column `{}` is not stated. turncal assumed the most common length. \
+                 State --rate.",
                 sheet.names[column]
             )
         });

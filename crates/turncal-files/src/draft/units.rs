@@ -214,8 +214,8 @@ impl Quantities {
                 if let Some((word, period)) = usual_period(all, angle) {
                     let [stated, usual] = [rows.period, period].map(|of| rounded(of.recip(), 4));
                     return Unit::open(&format!(
-                        "no unit fits the change of gravity direction at {stated} Hz; {word} would at about {usual} Hz. \
-                         Check the rate"
+                        "no unit fits the change of gravity direction at {stated} Hz; {word} would fit at about \
+                         {usual} Hz. Check the rate"
                     ));
                 }
             }

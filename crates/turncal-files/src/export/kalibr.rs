@@ -76,7 +76,7 @@ fn configuration<'a>(values: &'a Values<'a>, program: &str, indent: &str) -> (St
         let (walk, is_usual) = triad.varying().unzip();
         let usual = match is_usual {
             Some(true) => {
-                ", the value that is usual for this noise density; measure the bias random walk with `turncal allan`"
+                ", a typical value for this noise density; measure the bias random walk with `turncal allan`"
             }
             _ => "",
         };

@@ -95,7 +95,7 @@ fn noise(values: &Values, missing: &mut Vec<String>) -> String {
     };
     let line = |name: &str, value: f64, unit: f64, unit_name: &str, is_usual: bool| {
         let usual = if is_usual {
-            ", the value that is usual for this white noise"
+            ", a typical value for this white noise"
         } else {
             ""
         };

@@ -114,12 +114,12 @@ impl<'a> Remarks<'a> {
         lines.map(|line| comment(self.mark, &line)).collect()
     }
 
-    /// A file that consists of these comments and a text.
+    /// A file that consists of these comments and the given text.
     pub fn above(&self, text: &str) -> Exported {
         self.of_file((self.text() + text).into_bytes())
     }
 
-    /// A file whose own form contains these comments, or which has none.
+    /// A file to which no comments are added, because its format stores them elsewhere or has none.
     pub fn of_file(&self, bytes: Vec<u8>) -> Exported {
         Exported {
             bytes,

@@ -1,4 +1,4 @@
-//! ROS: covariances of `sensor_msgs/Imu`, and the accelerometers' calibration of `imu_calib`.
+//! ROS: covariances of `sensor_msgs/Imu`, and the accelerometer calibration file that `imu_calib` reads.
 //!
 //! Source: ROS common_interfaces, `sensor_msgs/Imu`; imu_calib, `AccelCalib::applyCalib` and
 //! `ApplyCalib::rawImuCallback`.

@@ -172,7 +172,7 @@ impl Normalised {
         Some(self.noise?.random_walk)
     }
 
-    /// Bias variation, and whether it is only the value that is usual for this white noise.
+    /// Bias variation, and whether it is only a typical value for this white noise.
     pub fn varying(&self) -> Option<(GaussMarkov, bool)> {
         let noise = self.noise?;
         let usual = || (usual_variation(&noise), true);

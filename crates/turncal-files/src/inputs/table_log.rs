@@ -133,8 +133,7 @@ impl<'a> Fields<'a> {
                 let path = format!("turntable.{key}");
                 let expected =
                     "`angles` in the table log, because a quaternion does not separate the axes";
-                let advice =
-                    "Remove it, or add the angles of the table axes; the quaternion may stay.";
+                let advice = "Remove this field, or add the angles of the table axes; the quaternion may remain.";
                 return Err(self.document.wrong(&path, expected, advice));
             }
             axes += kind.of_table(angles, sigma(stated));

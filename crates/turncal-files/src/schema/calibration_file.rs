@@ -164,7 +164,7 @@ fn check_covariance(record: &Calibration) -> Checked {
         expect!(
             row.iter().all(|value| value.is_finite()) && row[i] >= 0.0,
             "finite numbers, with none below zero on the diagonal",
-            "an impossible value in row {} of covariance",
+            "an invalid value in row {} of covariance",
             i + 1
         );
     }

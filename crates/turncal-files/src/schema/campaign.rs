@@ -78,7 +78,8 @@ impl Campaign {
 
     /// Reads a campaign and its recordings, whose paths are relative to it.
     ///
-    /// # Errors [`FileError`] if the campaign or a recording cannot be read, or a value is invalid.
+    /// # Errors
+    /// Returns [`FileError`] if the campaign or a recording cannot be read, or a value is invalid.
     pub fn read(path: &Path) -> Result<Self, FileError> {
         let text = small_file::text(path, "the campaign", "Give the path of a campaign.toml.")?;
         let document = Document::of(path, &text);

@@ -45,7 +45,8 @@ const COUNTRIES: &str = "AD AE AF AG AI AL AM AO AQ AR AS AT AU AW AX AZ BA BB B
 
 /// Reads and checks a lab.toml. `meta` contains metadata of the run, to complete `[item]`.
 ///
-/// # Errors [`FileError`] that lists all empty or missing fields, or gives the first invalid one.
+/// # Errors
+/// Returns a [`FileError`] that lists all empty or missing fields, or states the first invalid one.
 pub fn read_laboratory(
     path: &Path,
     meta: impl Fn(&str) -> Option<String>,
@@ -61,7 +62,7 @@ pub fn read_laboratory(
     let mut open = Vec::new();
     take_empty(table.get_mut(), "", &mut open);
     let file: Result<Laboratory, FileError> = document.fill(table.clone());
-    // All open fields are reported at once, unless another error comes first.
+    // All incomplete fields are reported at once, unless another error comes first.
     if !matches!(&file, Err(error) if !error.message.starts_with("found no ")) {
         open.extend(missing(table.get_ref(), &of_item, &open));
         check_complete(document, open)?;
@@ -77,7 +78,7 @@ pub fn read_laboratory(
     Ok(file)
 }
 
-/// Removes empty texts and adds their paths; normalises the white space of the others for page and XML.
+/// Removes empty strings and adds their paths to `open`; normalises the white space of the others for page and XML.
 fn take_empty(fields: &mut DeTable, path: &str, open: &mut Vec<String>) {
     let mut empty = Vec::new();
     for (name, value) in fields.iter_mut() {
@@ -100,7 +101,7 @@ fn take_empty(fields: &mut DeTable, path: &str, open: &mut Vec<String>) {
         .for_each(|name| drop(fields.remove(name.as_str())));
 }
 
-/// Whether a text, or one in a list, is empty; white space is normalised on the way.
+/// Whether a string, or one in an array, is empty; white space is normalised on the way.
 fn has_empty(value: &mut DeValue) -> bool {
     match value {
         DeValue::String(text) => {
@@ -131,7 +132,7 @@ fn missing(table: &DeTable, of_item: &[(&str, Option<String>)], open: &[String])
     missing.filter(|path| !open.contains(path)).collect()
 }
 
-/// Lists every open field, in the order of the tables in the file and, within a table, in the order of the draft.
+/// Lists every incomplete field, in the order of the tables in the file and, within a table, in the order of the draft.
 fn check_complete(document: Document, mut open: Vec<String>) -> Result<(), FileError> {
     let place = |path: &String| {
         let (table, name) = path.split_once('.').unwrap_or(("", path));
@@ -143,11 +144,11 @@ fn check_complete(document: Document, mut open: Vec<String>) -> Result<(), FileE
     open.sort_by_key(place);
     let fields = match open.len() {
         0 => return Ok(()),
-        1 => "1 open field".to_owned(),
-        count => format!("{count} open fields"),
+        1 => "1 incomplete field".to_owned(),
+        count => format!("{count} incomplete fields"),
     };
     let all = open.join(", ");
-    let expected = "a text or value in each field (ISO/IEC 17025, 7.8.2 and 7.8.4)";
+    let expected = "a value in each field (ISO/IEC 17025, 7.8.2 and 7.8.4)";
     let advice = format_args!("Complete {all}.");
     Err(FileError::of(document.file, fields, expected, advice))
 }
@@ -221,7 +222,7 @@ mod tests {
         let without = LAB.replace("number = ", "# number = ");
         let message = read(&without).unwrap_err().to_string();
         assert!(message.contains("certificate.number") && !message.contains("customer"));
-        assert!(message.contains("found 1 open field"), "{message}");
+        assert!(message.contains("found 1 incomplete field"), "{message}");
     }
 
     #[test]

@@ -93,7 +93,8 @@ pub fn run_of_text(
 
 /// The IMU file given in a `run.toml`; it need not exist.
 ///
-/// # Errors [`FileError`] if the `run.toml` is invalid.
+/// # Errors
+/// Returns [`FileError`] if the `run.toml` is invalid.
 pub fn imu_file_of(path: &Path) -> Result<PathBuf, FileError> {
     let text = text_of(path)?;
     let file = run_file(Document::of(path, &text))?.imu.file;
@@ -102,7 +103,8 @@ pub fn imu_file_of(path: &Path) -> Result<PathBuf, FileError> {
 
 /// Reads only `[meta]` of a `run.toml`, for a run with unreadable logs.
 ///
-/// # Errors [`FileError`] if it cannot be read.
+/// # Errors
+/// Returns [`FileError`] if the file cannot be read.
 pub fn read_meta(path: &Path) -> Result<BTreeMap<String, String>, FileError> {
     let text = text_of(path)?;
     let document = Document::of(path, &text);
@@ -259,7 +261,7 @@ impl InstrumentFields<'_> {
     }
 }
 
-/// The directory name of a `run.toml`, otherwise the file name without extensions.
+/// The directory name if the file is a `run.toml`; if not, the file name without extensions.
 pub fn name(path: &Path) -> String {
     let mut full = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     if full.extension().is_some_and(|of| of == "gz") {

@@ -35,8 +35,8 @@ pub struct RunFile {
     /// Place of the recording
     #[serde(default)]
     pub site: SiteFile,
-    /// Texts that are copied into the result: instrument, serial, operator, date, temperature_degc, laboratory,
-    /// table, notes
+    /// Strings, numbers or dates that are copied into the result: instrument, serial, operator, date, temperature_degc,
+    /// laboratory, table, notes
     #[serde(default)]
     pub meta: BTreeMap<String, String>,
     /// Log of the IMU, its units, noise and prior
@@ -75,7 +75,7 @@ pub struct ImuFile {
     pub stream: Option<String>,
     /// Accelerometers that are not in the rows of the gyros
     pub accel_from: Option<AccelFromFile>,
-    /// Use a damaged log up to the damage; default: false
+    /// Use a damaged log up to the damaged part; default: false
     pub salvage: Option<bool>,
     /// Quantity in a row: number of whole counts in the sample (pulse), integral over the sample (increment) or mean
     /// over the sample (rate)
@@ -92,7 +92,8 @@ pub struct ImuFile {
     pub time_unit: Option<TimeUnitField>,
     /// Time from row to row, s; default: from the time stamps
     pub sample_period_s: Option<Positive>,
-    /// 1σ of the sample period, ppm; default: 10000 without a time column and a [turntable], otherwise 0
+    /// 1σ of the sample period, ppm; default: 10000 for rates with neither a time column nor a [turntable], 0 in all
+    /// other cases
     pub sample_period_sigma_ppm: Option<NonNegative>,
     /// Whether a stamp marks the end, the start or the middle of its sample
     pub time_stamp: TimeStamp,
@@ -104,7 +105,7 @@ pub struct ImuFile {
     pub body_axes: Option<BodyAxes>,
     /// Use only the rows of one of several instruments
     pub instance: Option<InstanceFile>,
-    /// Names or numbers of the columns; a minus before a name reverses its sign
+    /// Names or numbers of the columns; a minus sign before a name reverses the sign of the column
     pub columns: ImuColumns,
     /// Noise figures by name, such as angle_random_walk_deg_per_sqrt_h
     #[serde(default)]
@@ -153,7 +154,7 @@ pub struct AccelFromFile {
     pub file: Option<String>,
     /// Stream that contains the accelerometers
     pub stream: Option<String>,
-    /// Use a damaged log up to the damage
+    /// Use a damaged log up to the damaged part
     pub salvage: Option<bool>,
     /// Time column of the accelerometers
     pub time: Option<TimeColumn>,
@@ -267,7 +268,7 @@ pub struct TurntableFile {
     pub file: String,
     /// Stream that contains the attitude, in a file with several streams
     pub stream: Option<String>,
-    /// Use a damaged log up to the damage; default: false
+    /// Use a damaged log up to the damaged part; default: false
     pub salvage: Option<bool>,
     /// Unit of the time column
     pub time_unit: Option<TimeUnitField>,
@@ -277,7 +278,7 @@ pub struct TurntableFile {
     pub columns: TableColumns,
     /// Axis of each angle when all angles are zero, such as z, x, y
     pub axes: Option<Vec<String>>,
-    /// 1σ per axis of the position error, ″: constant in a dwell, independent at every position
+    /// 1σ per axis of the position error, ″: constant in a dwell, independent between positions
     pub position_sigma_arcsec: Angle,
     /// 1σ per axis of the white error of each reading, ″
     pub reading_sigma_arcsec: Angle,

@@ -1,4 +1,4 @@
-//! Fields whose values are words.
+//! Fields whose values are keywords.
 
 use serde::{Deserialize, Serialize};
 
@@ -93,7 +93,8 @@ impl TimeUnitField {
 
     /// The unit.
     ///
-    /// # Errors The name, if it is not one of [`TimeUnit::WORDS`].
+    /// # Errors
+    /// Returns the name if it is not one of [`TimeUnit::WORDS`].
     pub fn unit(&self) -> Result<TimeUnit, &str> {
         let name = match self {
             Self::Tick(tick) => return Ok(TimeUnit::PerSecond(tick.0.recip())),

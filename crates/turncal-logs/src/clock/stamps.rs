@@ -159,7 +159,10 @@ impl Stamps {
         }
         let time = self.time_of(csv, column)?;
         if time + self.usual_step() == time {
-            return Err(csv.not(column, "a time small enough to resolve one sample period"));
+            return Err(csv.not(
+                column,
+                "a time value small enough to resolve one sample period",
+            ));
         }
         if let Some(before) = self.time {
             let step = time - before;
@@ -422,9 +425,9 @@ impl Stamps {
             )),
             TimeUnit::Count => (missing > 0).then(|| {
                 format!(
-                    "Rows are missing, and the counter wraps every {} samples ({} s). Each gap may be longer by one \
-                     or more of these periods; all later times would then be too early by the same amount. Use a time \
-                     that does not wrap, or split the recording at the gaps.",
+                    "Rows are missing, and the counter wraps every {} samples ({} s). Each gap may be longer by one or \
+                     more of these periods; all later times would then be too early by the same amount. Use a time \
+                     column that does not wrap, or split the recording at the gaps.",
                     (size / self.period()).round(),
                     nanoseconds(size)
                 )

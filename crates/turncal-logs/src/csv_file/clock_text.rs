@@ -1,6 +1,6 @@
 //! Times as text: a date and time of day, a time of day, or seconds with a fraction that lost its leading zeros.
 
-/// Converts the texts of a column to times.
+/// Converts the strings in a column to times.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ClockText {
     /// Number of digits of fractions written without leading zeros.
@@ -88,7 +88,7 @@ fn parts(text: &str) -> Option<(f64, &str)> {
 }
 
 impl ClockText {
-    /// The conversion for a column with these texts in the first rows; `None` if the texts are plain numbers.
+    /// The conversion for a column with these strings in the first rows; `None` if the strings are plain numbers.
     pub fn of(texts: &[&str]) -> Option<Self> {
         let parts: Vec<_> = texts.iter().filter_map(|text| parts(text)).collect();
         if parts.is_empty() || 2 * parts.len() < texts.len() {
@@ -119,7 +119,7 @@ impl ClockText {
         }
     }
 
-    /// Time of a text, s.
+    /// Time stated by a string, s.
     pub fn seconds(self, text: &str) -> Option<f64> {
         parts(text).map(|(whole, fraction)| self.seconds_of(whole, fraction))
     }
@@ -130,7 +130,7 @@ impl ClockText {
         whole + count / 10f64.powi(i32::try_from(digits).unwrap_or(0))
     }
 
-    /// Remark on assumptions about the texts of the column, if any were made.
+    /// Remark on assumptions about the strings in the column, if any were made.
     pub fn remark(self, name: &str) -> Option<String> {
         let digits = self.unpadded?;
         Some(format!(

@@ -1,4 +1,4 @@
-//! Structure of a text from its first lines: preamble, lines of names and units, and rows, possibly tagged.
+//! Structure of a text file, found from its first lines: preamble, lines of names and units, and rows, possibly tagged.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -22,7 +22,7 @@ const SCALES: [(&str, char, &str); 3] = [
     ("ascale", 'a', "g"),
 ];
 
-/// Content of a text.
+/// Content of a text file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Heading {
     pub delimiter: Delimiter,
@@ -53,7 +53,7 @@ pub struct Tags {
     pub names: Vec<String>,
 }
 
-/// The parsed first lines of a text.
+/// The parsed first lines of a text file.
 pub struct Looks(Vec<Look>);
 
 struct Look {

@@ -1,4 +1,4 @@
-//! The layout of the rows of a text, used to distinguish rows from other lines as they arrive.
+//! The layout of the rows of a text file, used to distinguish rows from other lines as they arrive.
 
 use super::heading::Delimiter;
 use super::lines::{comment, has_content};
@@ -8,7 +8,7 @@ use turncal_input::excerpt;
 /// Minimum number of columns of numbers in rows; a sentence may contain one.
 const FEWEST_NUMBERS: usize = 2;
 
-/// Delimiter of the rows of a text, and which of their columns are numbers.
+/// Delimiter of the rows of a text file, and which of their columns are numbers.
 #[derive(Debug, Clone)]
 pub struct RowKind {
     delimiter: Delimiter,

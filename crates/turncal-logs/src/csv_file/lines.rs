@@ -1,5 +1,5 @@
-//! Lines of a text in UTF-8 or UTF-16 with any usual line ending. This module limits the memory used per file, for all
-//! callers.
+//! Lines of a text file in UTF-8 or UTF-16, with any common line ending. This module limits the memory used per file,
+//! for all callers.
 
 use std::collections::VecDeque;
 use std::io::{self, BufRead, BufReader, ErrorKind, Read};

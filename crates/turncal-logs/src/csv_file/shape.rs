@@ -1,7 +1,7 @@
-//! The shape of a line: its words and signs, with every number and time replaced by a mark.
+//! The shape of a line: its words and punctuation, with every number and time replaced by a mark.
 //!
 //! Lines whose shapes repeat form streams of samples. The text before a mark is the name of its value; a line with a
-//! rare shape is a remark, a damaged row or the text of a starting device.
+//! rare shape is a remark, a damaged row or the start-up text of a device.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -90,7 +90,7 @@ fn digits(text: &[u8]) -> usize {
     text.iter().take_while(|byte| byte.is_ascii_digit()).count()
 }
 
-/// Length of a number at the beginning of a text. Letters after it end its field; otherwise, it is not a number.
+/// Length of a number at the beginning of a string. Letters after it end its field; otherwise, it is not a number.
 fn number(text: &[u8], comma: bool) -> Option<usize> {
     let mut at = usize::from(matches!(text.first(), Some(b'+' | b'-')));
     if let [a, b, c, rest @ ..] = &text[at..]
@@ -128,7 +128,7 @@ fn number(text: &[u8], comma: bool) -> Option<usize> {
     ends.then_some(at)
 }
 
-/// Length of a date, a time of day or both at the beginning of a text.
+/// Length of a date, a time of day or both at the beginning of a string.
 fn time(text: &[u8]) -> Option<usize> {
     let mut at = date(text);
     if at > 0 && matches!(text.get(at), Some(b' ' | b'T' | b'_')) && clock(&text[at + 1..]) > 0 {
@@ -251,7 +251,7 @@ pub struct Stream {
     pub units: Vec<String>,
 }
 
-/// The streams of a text whose rows contain words beside their numbers.
+/// The streams of a text file with rows that contain words next to their numbers.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Labelled {
     comma: bool,
@@ -595,7 +595,7 @@ struct Label {
     unit: String,
     /// Axis at the end of the words.
     axis: Option<char>,
-    /// Whether the value only increases, as a time does.
+    /// Whether the value only increases, as time stamps do.
     increases: bool,
 }
 

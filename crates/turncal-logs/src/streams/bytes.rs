@@ -4,7 +4,7 @@ use std::io::{self, Read, Seek, SeekFrom};
 
 use crate::data_file::Content;
 
-/// The reason for which the reading of a file stopped, and the position.
+/// The reason why reading a file stopped, and the position.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Broken {
     /// Offset from the start of the file, in bytes.
@@ -213,13 +213,13 @@ impl<'a> Slice<'a> {
         self.take(length, what)
     }
 
-    /// Text preceded by a length field of this many bytes.
+    /// A string preceded by a length field of this many bytes.
     pub fn measured_text(&mut self, size: usize, what: &str) -> Result<String, Broken> {
         let length = self.length(size, "a length")?;
         self.text(length, what)
     }
 
-    /// A text of this length; invalid UTF-8 is replaced.
+    /// A string of this length; invalid UTF-8 is replaced.
     pub fn text(&mut self, count: usize, what: &str) -> Result<String, Broken> {
         let bytes = self.take(count, what)?;
         let end = bytes.iter().position(|&byte| byte == 0);

@@ -36,7 +36,7 @@ pub struct Found {
     pub samples: u64,
 }
 
-/// All streams of a log that contain samples, and the error at the first damage.
+/// All streams of a log that contain samples, and the error at the first damaged part.
 pub fn survey(file: &Path, mut log: Box<dyn Log>) -> (Vec<Found>, Option<FileError>) {
     let mut samples: Vec<u64> = Vec::new();
     let mut row = Vec::new();

@@ -185,8 +185,7 @@ pub fn run(report: &Report) -> Facts {
     }
     if let Some(table) = report.table() {
         let readings = format!(
-            "{} readings; position error {} ″ (1σ, independent from position to position), reading error {} ″ (1σ, \
-             white)",
+            "{} readings; position error {} ″ (1σ, independent between positions), reading error {} ″ (1σ, white)",
             count(table.time.len()),
             sigma(run.table.position_sigma / ARCSEC),
             sigma(run.table.reading_sigma / ARCSEC)

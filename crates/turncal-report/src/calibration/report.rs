@@ -56,7 +56,7 @@ pub struct Report<'a> {
 pub struct ClosedForm<'a> {
     /// The estimate of the closed form with its stated σ.
     pub estimate: &'a Estimate,
-    /// The data that the closed form used, such as `six positions, 60 min of its own`.
+    /// The data that the closed form used, such as `six positions, 60 min of table time`.
     pub note: &'a str,
 }
 

@@ -77,8 +77,8 @@ pub fn orders(form: InstallationForm, thermal: &Thermal) -> Table {
         }))
         .note(format!(
             "Legendre coefficients ± 1σ over {ranges}: each coefficient is the change of the parameter over half the \
-             temperature range. Each order is averaged over the case that it is absent and the cases that it has one \
-             of its usual sizes."
+             temperature range. Each order is averaged over the case in which it is absent and the cases in which it \
+             has one of its typical magnitudes."
         ))
 }
 

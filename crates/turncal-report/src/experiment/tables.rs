@@ -91,7 +91,7 @@ fn paper(experiment: &Experiment, navigated: &Navigated) -> Table {
     )
 }
 
-/// Duration of the navigation.
+/// Duration of the navigation run.
 pub fn hours(experiment: &Experiment) -> f64 {
     f64::from(experiment.study.intervals) * INTERVAL / HOUR
 }

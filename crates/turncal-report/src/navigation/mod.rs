@@ -1,4 +1,4 @@
-//! Report on a navigation: errors with predicted σ as a table, as figures against time like Figures 2 to 10 of the
+//! Report on a navigation run: errors with predicted σ as a table, as figures against time like Figures 2 to 10 of the
 //! paper, per minute as CSV, and per hour as JSON.
 
 mod outlook;
@@ -17,7 +17,7 @@ pub use outlook::{add, line};
 /// Hours over which the paper states the position drift.
 const PAPER_HOURS: f64 = 40.0;
 
-/// A navigation with its input.
+/// A navigation run with its input.
 #[derive(Debug, Clone, Copy)]
 pub struct Navigation<'a> {
     /// Name of the calibration.
@@ -42,7 +42,7 @@ pub struct Navigation<'a> {
 }
 
 impl Navigation<'_> {
-    /// The complete report on the navigation.
+    /// The complete report on the navigation run.
     pub fn document(&self) -> Document {
         let (calibration, truth) = (self.calibration, self.truth);
         let title = format!("Navigation error of {calibration} against {truth}");

@@ -1,4 +1,4 @@
-//! σ of embedded paths in the time of a designed path.
+//! Comparison of a designed path with the embedded paths in the same time.
 
 use crate::prelude::*;
 use turncal::calibration::Estimate;
@@ -18,19 +18,20 @@ pub fn table(design: &Design) -> Table {
     let designed = row("this path", "1.00".to_owned(), Some(&design.estimate));
     let titles = Group::all().map(|group| format!("{}, {}", group.short(), group.unit()));
     let heading = if design.study.options.auto_terms {
-        "Expected 1σ in the same time, if every error term may have its usual size"
+        "Expected 1σ in the same time, if every error term may have its typical magnitude"
     } else {
         "Expected 1σ in the same time"
     };
     Table::new(heading, cells!["path", "dwells ×"].into_iter().chain(titles))
         .section(std::iter::once(designed).chain(others))
         .note(
-            "Dwells ×: factor of all dwells of an embedded path, so that it takes the same time. A dash: its moves \
-             alone need too much of this time. six-position: the positions of Zhao, Jiang, Li 2016.",
+            "Dwells ×: factor by which all dwells of an embedded path were scaled so that the path takes the same \
+             time. Dash: the moves of the path alone take too long. six-position: the positions of Zhao, Jiang, Li \
+             2016.",
         )
 }
 
-/// σ of the designed path, and factor of the dwells and σ of every other path by name.
+/// σ of the designed path and, by name, the dwell factor and the σ of every other path.
 pub fn data(design: &Design) -> Value {
     let sigma = |estimate: Option<&Estimate>| {
         let sigma = Group::all().map(|group| (group.key(), rms(group, estimate).into()));

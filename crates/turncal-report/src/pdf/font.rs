@@ -62,13 +62,13 @@ impl Typeface {
         self.metrics.advance_width(glyph).unwrap_or(0.0) / self.units_per_em
     }
 
-    /// The characters of a text that the font cannot show.
+    /// The characters of a string that the font cannot show.
     pub fn lacks<'a>(&'a self, text: &'a str) -> impl Iterator<Item = char> + 'a {
         text.chars()
             .filter(|&character| self.glyph(character).is_none())
     }
 
-    /// Glyphs of a text, one per character, with advances for a font size of one.
+    /// Glyphs of a string, one per character, with advances for a font size of one.
     pub fn glyphs(&self, text: &str) -> Vec<KrillaGlyph> {
         let glyph = |(at, character): (usize, char)| {
             let glyph = self.glyph(character).unwrap_or_default();

@@ -317,7 +317,7 @@ impl<'a> Layout<'a> {
         self.fonts.get(style.bold).width(text, style.size)
     }
 
-    /// The part of a text that fits into a line of this width.
+    /// The part of a string that fits into a line of this width.
     fn shortened(&self, text: &str, style: Style, room: f32) -> String {
         let mut lines = self.broken(text, style, room - self.width("…", style));
         let first = lines.next().unwrap_or_default();

@@ -1,4 +1,4 @@
-//! A document as a PDF/A-3 file: facts, tables and texts on A4 pages, with files attached.
+//! A document as a PDF/A-3 file: facts, tables and paragraphs on A4 pages, with files attached.
 
 mod font;
 mod layout;
@@ -35,7 +35,8 @@ pub struct Attached {
 
 /// The bytes of a PDF/A-3 file; equal documents give equal bytes.
 ///
-/// # Errors [`PdfError`] if a text cannot be shown.
+/// # Errors
+/// Returns [`PdfError`] if a character cannot be shown.
 pub fn write(
     document: &Document,
     frame: &Frame,

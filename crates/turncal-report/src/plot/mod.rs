@@ -39,7 +39,7 @@ pub struct Panel {
     pub series: Vec<Series>,
     /// Shaded intervals of the horizontal axis.
     pub shading: Vec<Range<f64>>,
-    /// Short texts above the curves, where space permits.
+    /// Short labels above the curves, where space permits.
     pub tags: Vec<(f64, String)>,
     /// Lines of text in the upper right corner.
     pub notes: Vec<String>,
@@ -101,7 +101,7 @@ impl Panel {
         self
     }
 
-    /// Adds short texts above the curves.
+    /// Adds short labels above the curves.
     pub fn tagged(mut self, tags: impl IntoIterator<Item = (f64, String)>) -> Self {
         self.tags = tags.into_iter().collect();
         self

@@ -47,7 +47,7 @@ pub enum Mark {
     Cross,
 }
 
-/// Position of a text.
+/// Position of the text relative to its point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Anchor {
     /// The text is centred above its point.
@@ -155,7 +155,7 @@ impl Series {
         Self::new(Shape::Marks(mark, points.into_iter().collect()))
     }
 
-    /// Points for values with σ, each with an interval of one standard deviation on either side.
+    /// Points for values with σ, each with an interval of one standard deviation on each side.
     pub fn measured(mark: Mark, points: impl IntoIterator<Item = (f64, f64, f64)>) -> Self {
         let points = points.into_iter();
         Self::whiskers(mark, points.map(|(x, y, own)| ((x, y), (y - own, y + own))))

@@ -73,7 +73,7 @@ pub fn rgb(color: Color) -> RGBColor {
     }
 }
 
-/// Approximate width of a text, in one of the wider fonts.
+/// Approximate width of a string, in one of the wider fonts.
 pub fn width(text: &str, scale: f64) -> f64 {
     let of = |letter: char| match letter {
         'i' | 'j' | 'l' | '\'' | '|' | 'I' => 0.29,
@@ -129,7 +129,7 @@ impl Canvas {
     {
         let mut document = String::new();
         let area = SVGBackend::with_string(&mut document, (MOST, MOST)).into_drawing_area();
-        // Writing into a text does not fail.
+        // Writing into a string does not fail.
         let _ = area.draw(&element);
         drop(area);
         let inside = document.split_once(">\n").map_or("", |(_, inside)| inside);
@@ -185,7 +185,7 @@ impl Canvas {
         self.put(Circle::new(place(at), px(radius), style));
     }
 
-    /// Writes text so that the point is at the given position within the text; a `scale` of 1 is the usual size.
+    /// Writes text so that the point is at the given position within the text; a `scale` of 1 is the normal size.
     pub fn text(
         &mut self,
         text: &str,

@@ -57,8 +57,8 @@ fn notes(table: &Table1) -> Vec<String> {
          are horizontal norms. 0 means less than 5e-10."
             .to_owned(),
         format!(
-            "z: mean of the paper minus mean of {} samples, divided by the standard error of the difference, s \
-             √(1/{} + 1/{}), where s is from these samples. Means agree if |z| ≤ {AGREEMENT} (99 %).",
+            "z: mean in the paper minus mean of {} samples, divided by the standard error of the difference, s √(1/{} \
+             + 1/{}), where s is from these samples. Means agree if |z| ≤ {AGREEMENT} (99 %).",
             count(table.population),
             paper::SAMPLES,
             table.population

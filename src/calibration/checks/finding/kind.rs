@@ -59,8 +59,9 @@ macro_rules! kinds {
 kinds! {
     Recording = "W01" "recording" Note:
         "turncal repaired or assumed something when it read the log: for example, it bridged gaps, dropped rows, \
-         corrected an uneven clock, or assumed a location or noise figure that run.toml does not state. The σ include the effect. \
-         If the finding names a field, state this field in run.toml. `turncal check` lists all faults of a log."
+         corrected an uneven clock, or assumed a location or noise figure that run.toml does not state. The σ include \
+         the effect. If the finding names a field, set this field in run.toml. `turncal check` lists all faults of a \
+         log."
         "Before the evaluation, faults in the recorded data were repaired or missing information was assumed; U \
          includes the effect."
     NotConverged = "W02" "not-converged" Failed:
@@ -116,18 +117,18 @@ kinds! {
         "The results apply only together with the error terms listed in this certificate."
     Settling = "W15" "settling" Note:
         "After stops, the attitude differs from the reading of the table by an angle that fades within seconds. \
-         turncal estimated the usual size of this angle, and the σ include this error. Wait longer after each stop, or \
-         state settling_sigma_arcsec in [turntable]."
+         turncal estimated the typical magnitude of this angle, and the σ include this error. Wait longer after each \
+         stop, or state settling_sigma_arcsec in [turntable]."
         "The turntable settled for some seconds after its moves; U includes the effect."
     PositionWrong = "W16" "position-wrong" Care:
         "The table attitude in one dwell contradicts the gyros and accelerometers. turncal gave the readings of this \
          dwell next to no weight and used the rest. Check the table log at this time for a missed step, a wrong label \
          or a bump."
-        "A reading of the turntable was in error and has practically no weight in the results."
+        "A reading of the turntable was wrong and has practically no weight in the results."
     MoveWrong = "W17" "move-wrong" Care:
         "In one move, the integrated gyro angle differs from the change of attitude. turncal estimated the \
          difference. Check this move for lost samples, a rate beyond the gyro range, or a mount that slipped."
-        "The rotation measured in a move was in error; the error was estimated together with the results."
+        "The rotation measured in a move was wrong; the error was estimated together with the results."
     BiasStep = "W18" "bias-step" Care:
         "A bias changed permanently between two dwells. turncal estimated this change; the calibration contains the \
          mean bias over the recording. Look for a shock or a change of supply voltage or temperature at that time, and \
@@ -193,7 +194,7 @@ kinds! {
     VelocityWrong = "W32" "velocity-wrong" Care:
         "In one move, the velocity change from the accelerometers has a far larger error than in other moves. turncal \
          estimated this error. Check this move for lost samples, a force beyond the range, or a bump."
-        "The acceleration measured in a move was in error; the error was estimated together with the results."
+        "The acceleration measured in a move was wrong; the error was estimated together with the results."
     Slipped = "W33" "slipped" Care:
         "From one dwell on, all attitudes are rotated by the same angle: the instrument slipped on the table, or the \
          table slipped on the ground. turncal estimated the angle, so scale factors and biases are hardly less \
@@ -202,9 +203,9 @@ kinds! {
         "The instrument slipped on the turntable; the misalignments apply to the mounting before the slip."
     TermNotShown = "W34" "term-not-shown" Note:
         "This recording cannot show an error term that instruments of this class may have, and K, E or D depend on the \
-         term. The σ include the usual size of this term. Add the moves listed in the finding, or state in \
+         term. The σ include the typical magnitude of this term. Add the moves listed in the finding, or state in \
          [imu.terms] that the instrument does not have the term: sigma = 0. `--with none` leaves out all terms."
-        "U includes the usual size of error terms that the recorded data cannot show."
+        "U includes the typical magnitude of error terms that the recorded data cannot show."
 }
 
 impl Kind {

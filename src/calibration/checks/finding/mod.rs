@@ -56,7 +56,7 @@ impl Finding {
         Self::new(Kind::StatementDoubted, doubt, figures)
     }
 
-    /// The finding; if the σ include the effect and increased by less than half, it is reduced to a note.
+    /// The finding, reduced to a note if the σ include the effect and increased by less than half.
     pub fn of_growth(self, growth: f64) -> Self {
         if growth < MATTERS {
             self.at(Level::Note)

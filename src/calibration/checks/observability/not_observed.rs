@@ -41,7 +41,7 @@ pub fn not_observed_by_path(outcome: &Outcome, far: Option<&Finding>) -> Vec<Fin
     findings.into_iter().flatten().collect()
 }
 
-/// Parameters whose linear change with temperature is hardly known beyond its usual size.
+/// Parameters whose linear change with temperature is hardly known beyond its typical magnitude.
 fn unseen_temperature(outcome: &Outcome) -> Vec<String> {
     let Some(thermal) = &outcome.thermal else {
         return Vec::new();

@@ -1,4 +1,4 @@
-//! One way to fill a hole, with its error on intact stretches.
+//! One way to fill a gap, with its error on intact stretches.
 
 use std::ops::Range;
 
@@ -6,24 +6,24 @@ use nalgebra::{Matrix4, Vector4};
 
 use crate::recording::faults::rows::consecutive;
 
-/// Maximum number of samples used on either side of a hole.
+/// Maximum number of samples used on each side of a gap.
 pub const MOST: usize = 64;
-/// Maximum number of intact stretches on either side for testing a fill.
+/// Maximum number of intact stretches used on each side for testing a fill.
 const TRIALS: usize = 16;
 /// Minimum number of intact stretches on both sides together for testing a fill.
 const FEWEST_TRIALS: usize = 8;
-/// If the change across the hole exceeds this many times the largest change across intact stretches, those stretches do
-/// not represent the hole.
+/// If the change across the gap exceeds this many times the largest change across intact stretches, those stretches do
+/// not represent the gap.
 const UNTRIED: f64 = 2.0;
 
 /// A least-squares polynomial through neighbours.
 pub struct Fill {
     hole: Range<usize>,
-    /// Runs of consecutive neighbours; those before the hole come first.
+    /// Runs of consecutive neighbours; those before the gap come first.
     runs: Vec<Range<usize>>,
-    /// Number of runs before the hole.
+    /// Number of runs before the gap.
     before: usize,
-    /// Weight of each neighbour in the sum over the hole.
+    /// Weight of each neighbour in the sum over the gap.
     weights: Vec<f64>,
     /// Offsets of the nearby intact stretches, in samples.
     shifts: Vec<isize>,
@@ -33,7 +33,7 @@ pub struct Fill {
 }
 
 impl Fill {
-    /// A polynomial of this degree through the neighbours before and after a hole, each listed outwards.
+    /// A polynomial of this degree through the neighbours before and after a gap, each listed outwards.
     pub fn new(
         degree: usize,
         sides: [&[usize]; 2],
@@ -88,7 +88,7 @@ impl Fill {
         }
     }
 
-    /// Fills the hole of an axis.
+    /// Fills the gap of an axis.
     pub fn apply(&self, axis: &mut [f64]) {
         let used = self.runs.iter().flat_map(Range::clone);
         let moments: Vector4<f64> = used.map(|k| self.powers(k) * axis[k]).sum();
@@ -98,7 +98,7 @@ impl Fill {
         }
     }
 
-    /// Offsets at which hole and neighbours are all usable, up to [`TRIALS`] on either side.
+    /// Offsets at which gap and neighbours are all usable, up to [`TRIALS`] on each side.
     fn intact(&self, sound: &[bool]) -> Vec<isize> {
         let is_sound = |run: &Range<usize>, shift| {
             let start = run.start.checked_add_signed(shift);
@@ -151,12 +151,12 @@ impl Fill {
         Some(halves.map(|half| half.max(sudden)))
     }
 
-    /// Sum of the filled values over the hole.
+    /// Sum of the filled values over the gap.
     pub fn sum(&self, axis: &[f64]) -> f64 {
         self.sum_after(axis, 0)
     }
 
-    /// The sum over a hole `shift` samples later.
+    /// The sum over a gap `shift` samples later.
     fn sum_after(&self, axis: &[f64], shift: isize) -> f64 {
         let (mut weights, mut sum) = (self.weights.as_slice(), 0.0);
         for run in &self.runs {
@@ -167,7 +167,7 @@ impl Fill {
         sum
     }
 
-    /// Mean of the neighbours after the hole minus the mean of those before, `shift` samples later; zero if one
+    /// Mean of the neighbours after the gap minus the mean of those before, `shift` samples later; zero if one
     /// side has none.
     fn change(&self, axis: &[f64], shift: isize) -> f64 {
         let (before, after) = self.runs.split_at(self.before);

@@ -13,7 +13,7 @@ fn fill(axis: &mut [f64], sound: &[bool], hole: &Range<usize>) -> Option<f64> {
     Hole::new(sound, hole.clone(), 1000).fill(axis, 0.0)
 }
 
-/// Mean square of the error over the mean variance stated, for holes of this length in a signal.
+/// Mean square of the error over the mean variance stated, for gaps of this length in a signal.
 fn consistency(signal: impl Fn(f64) -> f64, sigma: f64, length: usize) -> f64 {
     let mut random = ChaCha8Rng::seed_from_u64(3);
     let apart = 10 * length + 500;
@@ -86,7 +86,7 @@ fn a_hole_too_long_is_filled_but_not_vouched_for() {
     assert!((axis[550] - 550.0).abs() < 1e-9);
 }
 
-/// Means over many single holes of the error, its square and the stated variance, and the number of holes. The data
+/// Means over many single gaps of the error, its square and the stated variance, and the number of gaps. The data
 /// are pulses of this mean rate per row with normal noise of `sigma` pulses per row; the remainder of each row is
 /// carried into the next.
 fn pulses(rate: f64, sigma: f64) -> ([f64; 3], f64) {
@@ -157,7 +157,7 @@ fn no_pulse_is_gained_or_lost_on_average_however_sparse_they_are() {
             mean.abs() < 3.3 * by_chance,
             "{rate} {sigma}: {mean} ± {by_chance}"
         );
-        // Where pulses are sparse few holes make most of the squares.
+        // Where pulses are sparse few gaps make most of the squares.
         let ratio = square / stated;
         assert!((0.75..1.25).contains(&ratio), "{rate} {sigma}: {ratio}");
     }

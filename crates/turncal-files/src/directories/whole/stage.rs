@@ -157,7 +157,7 @@ impl Stage {
         if exists && exchange(&self.new_path(), &self.target).is_ok() {
             return Ok(());
         }
-        let refused = |error| unwritable(&self.target, "put the output in place", &error);
+        let refused = |error| unwritable(&self.target, "move the output into place", &error);
         if exists {
             fs::rename(&self.target, &old).map_err(refused)?;
         }
@@ -166,8 +166,8 @@ impl Stage {
         };
         if exists && fs::rename(&old, &self.target).is_err() {
             let stage = self.beside.stage.display();
-            let doing = format!("put the output in its place (the old output is in {stage})");
-            let advice = "Move it back by hand.";
+            let doing = format!("move the output into place (the old output is in {stage})");
+            let advice = "Move the old output back by hand.";
             return Err(FileError::io(&self.target, &doing, &error, advice));
         }
         Err(refused(error))
@@ -218,7 +218,7 @@ fn remove(stage: &Path) -> io::Result<()> {
     if new.exists() && old.exists() {
         return Err(io::ErrorKind::ResourceBusy.into());
     }
-    // Renamed first, so that a partly removed output is never put in place.
+    // Renamed first, so that a partly removed output is never moved into place.
     let _ = fs::rename(&new, &dead);
     for thing in [dead, old] {
         match fs::symlink_metadata(&thing) {

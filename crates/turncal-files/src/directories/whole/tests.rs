@@ -131,7 +131,7 @@ fn the_next_output_clears_what_a_killed_process_left_and_touches_no_living_one()
             fs::write(directory.join(file), "1").unwrap();
         }
     };
-    // Killed while it wrote, and after it had put its output in place.
+    // Killed while it wrote, and after it had moved its output into place.
     stage(".turncal-killed", &["new"]);
     stage(".turncal-late", &["old"]);
     // Perhaps about to be locked.

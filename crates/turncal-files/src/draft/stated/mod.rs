@@ -129,7 +129,8 @@ pub struct StatedUnit(pub Unit);
 impl StatedUnit {
     /// Parses the unit for the triad of a sensor.
     ///
-    /// # Errors The list of accepted units, if the text is not one of them.
+    /// # Errors
+    /// Returns the list of accepted units if the string is not one of them.
     pub fn parse(sensor: Sensor, text: &str) -> Result<Self, String> {
         let is_of_it = |unit: &Unit| match unit.of {
             Of::Rows(of, _) => of == sensor,

@@ -109,7 +109,7 @@ fn without_a_time_turns_tell_the_unit_that_has_a_usual_rate() {
         &text,
         &[
             why,
-            "# no column increases steadily, as a time does; turncal estimates the sample period from the turns",
+            "# no column increases steadily, as time stamps do; turncal estimates the sample period from the turns",
         ],
     );
     let rate = text.split(why).nth(1).unwrap().split(' ').next().unwrap();

@@ -15,7 +15,7 @@ const UNKNOWNS: usize = 10;
 pub struct Order([(usize, f64); 3]);
 
 impl Order {
-    /// The first order is that in which the columns are written.
+    /// The first order is the one in which the columns are written.
     pub fn all() -> impl Iterator<Item = Self> {
         let orders = [
             [0, 1, 2],

@@ -163,7 +163,7 @@ impl<'a> Parser<'a> {
     }
 }
 
-/// The messages and texts in a field.
+/// The messages and strings in a field.
 fn parts(bytes: &[u8], field: u64) -> Option<Vec<&[u8]>> {
     let mut all = values(bytes)?;
     all.retain(|value| value.field == field && value.way == 2);

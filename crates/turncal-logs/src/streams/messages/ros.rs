@@ -1,7 +1,7 @@
 //! ROS messages with definitions: ROS 1 serialisation, and CDR as in ROS 2.
 //!
 //! Each number becomes a column named by its path: `angular_velocity.x`, `orientation_covariance[0]`; a time of seconds
-//! and nanoseconds is one column in s. Texts and variable-length lists are skipped.
+//! and nanoseconds is one column in s. Strings and variable-length arrays are skipped.
 //!
 //! Source: wiki.ros.org/msg and wiki.ros.org/ROS/Technical Overview; ROS 2 design, "Interface definition"; OMG CDR
 //! (CORBA 3.3, 9.3) with the encapsulation of RTPS 2.3, 10.

@@ -20,7 +20,8 @@ use turncal::run::Aiding;
 
 /// Files of a certificate: PDF, XML and the calibration; the XML file and the calibration are also embedded in the PDF.
 ///
-/// # Errors [`PdfError`] if a text cannot be shown.
+/// # Errors
+/// Returns [`PdfError`] if a character cannot be shown.
 pub fn files(
     certificate: &Certificate,
     calibration: Vec<u8>,

@@ -56,7 +56,7 @@ impl Many {
 
 /// The definitions used while a type is built.
 pub struct Parser {
-    /// Names and texts; the first is that of the message.
+    /// Names and definitions; the first is that of the message.
     definitions: Vec<(String, String)>,
     encoding: Encoding,
     pub columns: Vec<Column>,
