@@ -101,8 +101,8 @@ fn other_times(moves: &[Move], resolved: f64, period: f64) -> Option<String> {
     if high - low <= resolved {
         return Some(format!(
             "In all {} moves, the gyros turn {} than the table. Convert both logs to the same clock.",
-            by(low.midpoint(high)),
-            moves.len()
+            moves.len(),
+            by(low.midpoint(high))
         ));
     }
     let changes = moves

@@ -152,8 +152,8 @@ fn of_motion(survey: &Survey) -> Vec<String> {
             "Missing positions"
         };
         findings.push(format!(
-            "{positions}: {}. There are {} upward directions that are {}° or more apart. Without a table, the nine \
-             accelerometer parameters need all six positions, or {DIRECTIONS} different upward directions.",
+            "{positions}: {}. Number of upward directions {}° or more apart: {}. Without a table, the nine accelerometer \
+             parameters need all six positions, or {DIRECTIONS} such directions.",
             missing.join(", "),
             degrees(APART),
             survey.directions
