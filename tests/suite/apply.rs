@@ -332,7 +332,7 @@ fn a_calibration_of_another_instrument_is_refused_with_the_reason() {
         .success();
     let said = String::from_utf8_lossy(&done.get_output().stderr);
     assert!(
-        said.contains("gyro scale factors differ by up to"),
+        said.contains("gyro scale factors differ from the nominal values of the run by up to"),
         "{said}"
     );
     let mut reversed = calibration(units, scale);

@@ -73,7 +73,7 @@ fn a_unit_that_was_edited_after_its_part_was_written_is_not_merged() {
     refused(
         "lot-part-edited",
         "merge l1 l2d -o out",
-        "that does not belong to it",
+        "that belongs to another unit",
     );
 }
 

@@ -317,7 +317,10 @@ fn recordings_that_differ_by_more_than_is_stated_are_found_to() {
     let path = made(here, "days", DAYS);
     let stated = estimated(&path);
     let text = fs::read_to_string(&path).unwrap();
-    let without = text.split("# 1σ from one recording").next().unwrap();
+    let without = text
+        .split("# 1σ of the difference from one recording")
+        .next()
+        .unwrap();
     fs::write(&path, without).unwrap();
     let silent = estimated(&path);
     let sigma = |outcome: &Outcome| {

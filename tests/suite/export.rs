@@ -235,7 +235,7 @@ pub fn divisors(text: &str) -> [Vector3<f64>; 2] {
 
 /// The biases of a comment, gyros first.
 pub fn biases(text: &str) -> [Vector3<f64>; 2] {
-    halves(&comment(text, "bias of gyroscopes").try_into().unwrap())
+    halves(&comment(text, "bias of the gyroscopes").try_into().unwrap())
 }
 
 /// Kalibr's measurement model, from its file alone: angular rate and specific force along the body

@@ -295,7 +295,7 @@ fn a_fraction_of_a_second_that_lost_its_zeros_is_read_as_a_number() {
         &draft(&log),
         &[
             "columns = { time = \"Time\", gyro = [\"GYRX\", ",
-            "continuous = true  # no gaps",
+            "continuous = true  # there are no gaps",
         ],
     );
 }
@@ -816,7 +816,7 @@ fn a_label_of_time_that_turns_contradict_is_given_up() {
     let refused = json_of(&log, &[&closed[..], &["--rate", "100"]].concat());
     let refused = refused.unwrap_err();
     assert!(
-        refused.contains("turns that fit the unit of the gyros at 40.6"),
+        refused.contains("turns that fit the unit of the gyros only at 40.6"),
         "{refused}"
     );
 }

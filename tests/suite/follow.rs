@@ -188,7 +188,10 @@ fn a_device_that_goes_comes_again_and_a_request_to_end_calibrates_what_was_read(
     );
     let output = child.wait_with_output().unwrap();
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(told.contains("gone") && told.contains("Ctrl-C"), "{told}");
+    assert!(
+        told.contains("disappeared") && told.contains("Ctrl-C"),
+        "{told}"
+    );
     assert_eq!(
         fs::read_to_string(directory.path().join("kept.csv")).unwrap(),
         rows

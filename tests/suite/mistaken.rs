@@ -59,7 +59,7 @@ fn exchanged_triads_of_a_header_are_told() {
     std::fs::write(place.join("imu.csv"), exchanged).unwrap();
     let message = refused(place, &["imu.csv", "--latitude", "34"]);
     assert!(
-        message.contains("gravity in gx gy gz and turns in ax ay az"),
+        message.contains("gravity in the columns gx gy gz and turns in the columns ax ay az"),
         "{message}"
     );
 }

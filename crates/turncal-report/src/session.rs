@@ -24,7 +24,7 @@ pub fn words(next: Move) -> String {
         Move::HalfTurn { axis, is_negative } => {
             let sign = if is_negative { "−" } else { "" };
             return format!(
-                "turn the instrument slowly by 180° about {sign}{} (right-handed)",
+                "turn the sensor slowly by 180° about {sign}{} (right-handed)",
                 AXES[axis]
             );
         }
@@ -33,18 +33,18 @@ pub fn words(next: Move) -> String {
     let axes = AXES.iter().zip(&up).filter(|(_, part)| **part != 0.0);
     let axes: Vec<String> = axes.map(|(axis, part)| signed_axis(*axis, *part)).collect();
     match axes.iter().map(String::as_str).collect::<Vec<_>>()[..] {
-        ["x"] => "put the instrument on its left side (x up)".to_owned(),
-        ["−x"] => "put the instrument on its right side (x down)".to_owned(),
-        ["y"] => "stand the instrument on its rear end (y up)".to_owned(),
-        ["−y"] => "stand the instrument on its front end (y down)".to_owned(),
-        ["z"] => "lay the instrument flat, top up (z up)".to_owned(),
-        ["−z"] => "lay the instrument flat, upside down (z down)".to_owned(),
+        ["x"] => "put the sensor on its left side (x up)".to_owned(),
+        ["−x"] => "put the sensor on its right side (x down)".to_owned(),
+        ["y"] => "stand the sensor on its rear end (y up)".to_owned(),
+        ["−y"] => "stand the sensor on its front end (y down)".to_owned(),
+        ["z"] => "lay the sensor flat, top up (z up)".to_owned(),
+        ["−z"] => "lay the sensor flat, upside down (z down)".to_owned(),
         [_, _] => format!(
-            "hold the instrument on an edge, with {} both 45° up",
+            "hold the sensor on an edge, with {} both 45° up",
             axes.join(" and ")
         ),
         _ => format!(
-            "hold the instrument on a corner, with {} equally far up",
+            "hold the sensor on a corner, with {} equally far up",
             axes.join(", ")
         ),
     }

@@ -51,7 +51,7 @@ fn a_path_that_the_table_cannot_follow_is_refused_when_it_is_named() {
           acceleration_deg_per_s2 = 1\ndwell_s = 0\nsteps = []",
     )
     .unwrap();
-    assert!(refused(file.path().to_str().unwrap()).contains("samples; expected 2 to"));
+    assert!(refused(file.path().to_str().unwrap()).contains("samples, expected 2 to"));
 }
 
 #[test]

@@ -81,7 +81,7 @@ fn a_table_log_that_does_not_reach_over_the_record_is_said() {
             table.attitude = table.attitude[readings.clone()].to_vec();
         };
         let run = reread(cut, as_they_are);
-        let said = says(&run, "The rest of the IMU log cannot be used");
+        let said = says(&run, "The other parts of the IMU log cannot be used");
         assert_eq!(said, words.is_some(), "{:?}", run.recording.doubts);
         assert!(words.is_none_or(|words| says(&run, words)));
     }
@@ -188,7 +188,7 @@ fn a_log_without_a_last_line_end_loses_its_last_row_and_says_so() {
     for (digits, said) in [
         (0, None),
         (1, Some("may lack digits")),
-        (40, Some("fields are missing")),
+        (40, Some("has too few fields")),
     ] {
         let cut = |mut rows: Vec<String>| {
             let last = rows.last_mut().unwrap();

@@ -253,7 +253,7 @@ fn each_wrong_value_in_run_toml_has_its_message() {
         (
             "quaternion = [\"qw\", \"qx\", \"qy\", \"qz\"]",
             "angles = [\"qw\"], axes = [\"x\", \"y\"]",
-            "angles & for each axis",
+            "angles & per axis",
         ),
         ("\"qz\"]", "\"qz\", \"qw\"]", "\"qw\"] & four columns"),
     ] {

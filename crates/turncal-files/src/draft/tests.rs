@@ -447,8 +447,7 @@ fn a_counter_that_other_packets_share_is_no_time_and_a_compass_no_gyro() {
     has(
         &text,
         &[
-            "# a counter shared with other packets cannot serve as a time column; the sample period is estimated from \
-             the turns",
+            "# a counter shared with other packets cannot serve as a time column",
             "columns = { gyro = [\"%float(RawGyroX)\", \"%float(RawGyroY)\", \"%float(RawGyroZ)\"], \
              accel = [\"%float(RawAccelX)\", ",
         ],

@@ -107,7 +107,7 @@ mod tests {
         assert!(((errors * input).norm() - 1.732e-3).abs() < 1e-6);
         let words = residual.words();
         assert!(
-            words.contains("1.732 mg at 1 g in any direction"),
+            words.contains("1.732 mg at 1 g if both are combined in any direction"),
             "{words}"
         );
     }

@@ -555,7 +555,7 @@ fn names_fields(line: &[u8], shape: &[u8]) -> bool {
     };
     let is_word = |field: &[u8]| {
         let field = field.trim_ascii();
-        !field.is_empty() && number(field, true) != Some(field.len())
+        !field.is_empty() && Marked::of(field, true).marks.is_empty()
     };
     let count = fields(line);
     count == fields(shape) && line.split(|byte| *byte == by).take(count).all(is_word)

@@ -68,14 +68,14 @@ fn a_value_is_shown_between_the_limits_of_its_specification() {
 fn a_position_that_every_dwell_is_far_from_is_missing() {
     let mut made_up = synthetic(InstallationForm::General);
     let caption = |made_up: &Synthetic| made_up.report().attitudes().unwrap().caption;
-    assert!(caption(&made_up).contains("(of the six): none"));
+    assert!(caption(&made_up).contains("(of six): none"));
     let imu = &mut made_up.run.recording.imu;
     let dwell = made_up.dwells[0].clone();
     let first = (dwell.end / imu.period) as usize;
     imu.gyro.to_mut().truncate(first);
     imu.accel.to_mut().truncate(first);
     made_up.run.recording.table = None;
-    assert!(caption(&made_up).contains("(of the six): x up"));
+    assert!(caption(&made_up).contains("(of six): x up"));
 }
 
 #[test]

@@ -109,7 +109,7 @@ fn noise_is_given_in_the_units_of_data_sheets() {
     for fact in [
         "random walk 0.0010 °/√h, Gauss–Markov bias 0.0030 °/h over 3600 s",
         "random walk 5.0 µg/√Hz",
-        "position 1.0 ″",
+        "position error 1.0 ″",
         "latitude 34.00000°",
     ] {
         assert!(page.contains(fact), "{fact}");

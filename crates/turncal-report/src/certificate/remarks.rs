@@ -66,7 +66,7 @@ mod tests {
         ]);
         assert_eq!(all.len(), 2);
         assert!(
-            all[0].ends_with("about some parameters (gyroscope scale factor x)."),
+            all[0].ends_with("assumed beforehand (gyroscope scale factor x)."),
             "{all:?}"
         );
     }

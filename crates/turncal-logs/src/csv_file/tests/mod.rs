@@ -140,8 +140,8 @@ fn a_file_that_ends_within_a_row_is_told_from_one_that_is_whole() {
         ("t,gx\n0,10\n1,20\n", 2, false, None),
         ("t,gx\n0,10,\n1,20,", 2, false, None),
         ("t,gx\n0,10\n1,2", 2, true, Some("may lack digits")),
-        ("t,gx\n0,10\n1", 1, false, Some("fields are missing")),
-        ("t,gx\n0,10\n1,\"2", 1, false, Some("fields are missing")),
+        ("t,gx\n0,10\n1", 1, false, Some("has too few fields")),
+        ("t,gx\n0,10\n1,\"2", 1, false, Some("has too few fields")),
     ] {
         fs::write(&path, content).unwrap();
         let mut csv = Source::of_file(path.as_path()).open().unwrap();
