@@ -39,6 +39,7 @@ impl Effect {
                     | Source::TablePosition
                     | Source::GyroGaussMarkov
                     | Source::AccelGaussMarkov
+                    | Source::MagneticDisturbance
             ),
             Self::Difference(_) | Self::Stated(_) => false,
         }

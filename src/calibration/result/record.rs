@@ -12,7 +12,7 @@ use super::{
 };
 use crate::calibration::parameters::{Before, factor};
 use crate::calibration::{
-    AtRest, Auxiliary, Budget, ClosedForm, Estimate, Finding, Nis, Outcome, PARAMETERS,
+    AtRest, Auxiliary, Budget, ClosedForm, Estimate, Finding, MagRecord, Nis, Outcome, PARAMETERS,
     ParameterVector, Problem, Quality, Reference, TermEvidence, Verdict, auxiliary_name,
     from_vector, parameter_name,
 };
@@ -41,7 +41,10 @@ impl Outcome {
         };
         let thermal = self.thermal.as_ref();
         let body_frame = problem.model.aiding.body_frame();
+        let log = run.recording.magnetometer.as_ref();
         let record = Calibration {
+            mag: (self.magnetic.as_ref().zip(log))
+                .and_then(|(estimate, log)| MagRecord::of_estimate(estimate, log)),
             format: format.to_owned(),
             method: Some(Method::Ekf),
             aiding: Some(problem.model.aiding),

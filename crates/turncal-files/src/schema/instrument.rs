@@ -6,6 +6,7 @@ use nalgebra::Vector3;
 
 use super::{Names, RunFile};
 use crate::imu_log::ImuLog;
+use crate::inputs::magnetometer::DISTURBANCE;
 use crate::inputs::temperature::TemperatureColumns;
 use crate::quantity::units;
 use turncal::imu::{
@@ -148,8 +149,8 @@ impl<'a> Fields<'a> {
         let unit = PerSensor::try_from_fn(|sensor| self.unit(sensor))?;
         let nominal = PerSensor::try_from_fn(|sensor| self.nominal(sensor, unit.get(sensor)))?;
         let names = Sensor::ALL.map(|sensor| NoiseKeys::of(sensor).names());
-        let names = names.as_flattened();
-        (self.document).only("imu.noise", imu.noise.keys(), names)?;
+        let names = [names.as_flattened(), &[DISTURBANCE.0]].concat();
+        (self.document).only("imu.noise", imu.noise.keys(), &names)?;
         let noise = PerSensor::try_from_fn(|sensor| self.noise(sensor))?;
         let prior = PerSensor::try_from_fn(|sensor| self.prior(sensor, *nominal.get(sensor)))?;
         let (term_sigma, absent_terms) = stated_terms(self.document, "imu.terms", &imu.terms)?;

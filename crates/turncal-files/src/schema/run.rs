@@ -74,6 +74,8 @@ pub struct ImuFile {
     pub stream: Option<String>,
     /// Accelerometers that are not in the rows of the gyros
     pub accel_from: Option<AccelFromFile>,
+    /// Magnetometer that is not in the rows of the gyros
+    pub mag_from: Option<AccelFromFile>,
     /// Use a damaged log up to the damage; default false
     pub salvage: Option<bool>,
     /// Content of a row: whole counts in the sample (pulse), the integral over the sample (increment) or the mean over
@@ -83,6 +85,8 @@ pub struct ImuFile {
     pub gyro_unit: Option<String>,
     /// Unit of the accelerometers: count; for increments m/s, g*s; for rates m/s^2, g, mg
     pub accel_unit: Option<String>,
+    /// Unit of the magnetometer: uT, nT, mT, T, G, mG or count
+    pub mag_unit: Option<String>,
     /// End of the range of the gyros, in the unit of a row; samples there are saturated
     pub gyro_full_scale: Option<Positive>,
     /// End of the range of the accelerometers, in the unit of a row; samples there are saturated
@@ -147,15 +151,15 @@ impl ImuFile {
 #[derive(Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AccelFromFile {
-    /// Log of the accelerometers; default: the log of the gyros
+    /// Log of the sensor; default: the log of the gyros
     pub file: Option<String>,
-    /// Stream that contains the accelerometers
+    /// Stream that contains the sensor
     pub stream: Option<String>,
     /// Use a damaged log up to the damage
     pub salvage: Option<bool>,
-    /// Time column of the accelerometers
+    /// Time column of the sensor
     pub time: Option<TimeColumn>,
-    /// Unit of the time column of the accelerometers
+    /// Unit of the time column of the sensor
     pub time_unit: Option<TimeUnitField>,
     /// Time from row to row, s
     pub sample_period_s: Option<Positive>,
@@ -191,6 +195,8 @@ pub struct ImuColumns {
     pub gyro: Option<Names<3>>,
     /// Three accelerometer columns, in the order of body_axes
     pub accel: Option<Names<3>>,
+    /// Three magnetometer columns, in any order
+    pub mag: Option<Names<3>>,
     /// Temperature column of the instrument, or one or three for each triad
     pub temperature: Option<TemperatureColumn>,
 }

@@ -13,6 +13,7 @@ use crate::calibration::chain::effects::{Dispersion, Effect, Slip};
 use crate::calibration::chain::part::{PartFilter, filter_of, part_filters};
 use crate::calibration::chain::short_rows::factor;
 use crate::calibration::chain::states::{ATTITUDE, NAVIGATION, POSITION, States, VELOCITY};
+use crate::calibration::magnetometer::MagneticRows;
 use crate::calibration::record::{Event, Rest, between};
 use crate::calibration::several::day_to_day::OwnState;
 use crate::calibration::{CalibrationError, Constant, Group, Problem, Script, Source, Stretch};
@@ -54,6 +55,7 @@ impl<'a, F: FnMut(Link) -> Result<(), CalibrationError>> Maker<'a, F> {
                 states,
                 constants,
                 turned: None,
+                magnetic: None,
             },
             pending: Transition::identity(states.count, constants.len()),
             take,
@@ -88,6 +90,7 @@ impl<'a, F: FnMut(Link) -> Result<(), CalibrationError>> Maker<'a, F> {
         let stretch = &problem.stretches()[number];
         let (prior, at) = (&script.priors[number], &script.at.initial_attitudes[number]);
         let start = stretch.start(prior, at);
+        self.dynamics.magnetic = script.at.magnetic;
         let before = number.checked_sub(1).map(|k| &problem.stretches()[k]);
         let same = before.filter(|before| before.recording == stretch.recording);
         if let Some(before) = same {
@@ -148,10 +151,21 @@ impl<'a, F: FnMut(Link) -> Result<(), CalibrationError>> Maker<'a, F> {
     }
 
     /// Resets some states, with these means and 1σ.
-    fn renew(&mut self, first: usize, (mean, sigma): (&[f64], &[f64]), effect: Effect) {
+    fn renew(&mut self, first: usize, of: (&[f64], &[f64]), effect: Effect) {
+        self.renew_at(self.dwell, first, of, effect);
+    }
+
+    /// Does the same for an event of this number.
+    fn renew_at(
+        &mut self,
+        event: usize,
+        first: usize,
+        (mean, sigma): (&[f64], &[f64]),
+        effect: Effect,
+    ) {
         self.pending.reset(first..first + mean.len(), mean);
         let root = DMatrix::from_diagonal(&DVector::from_column_slice(sigma));
-        self.pending.drive(effect, self.dwell, first, &root);
+        self.pending.drive(effect, event, first, &root);
     }
 
     /// Adds a move.
@@ -223,6 +237,10 @@ impl<'a, F: FnMut(Link) -> Result<(), CalibrationError>> Maker<'a, F> {
             Transition::identity(n, self.dynamics.constants.len()),
         );
         let rows = given.rows(&part).and(place);
+        let rows = match self.magnetic(rest) {
+            Some(magnetic) => magnetic.and(rows),
+            None => rows,
+        };
         if !rows.values.iter().all(|value| value.is_finite()) {
             return Err(diverged());
         }
@@ -244,6 +262,23 @@ impl<'a, F: FnMut(Link) -> Result<(), CalibrationError>> Maker<'a, F> {
             .map(|step| rest.models[step.model].duration);
         self.vary(duration.sum(), self.dwell - 1);
         Ok(())
+    }
+
+    /// Rows of the magnetometer in a part, if it is observed there.
+    fn magnetic(&mut self, rest: &Rest) -> Option<Rows> {
+        let weight = self.problem.model.weight(BudgetSource::MagneticNoise);
+        let Dynamics {
+            states, constants, ..
+        } = self.dynamics;
+        let seen = (rest.magnetic.as_ref()?, weight);
+        let at = self.dynamics.magnetic.as_ref()?;
+        let of = MagneticRows::new(seen, &rest.begin.attitude, at, (states, constants));
+        self.log_determinant += of.log_determinant;
+        Some(Rows {
+            states: of.states,
+            constants: of.constants,
+            values: of.values,
+        })
     }
 
     /// Refers the states to the beginning of a part. If the body came to rest at a new position, the table position is
@@ -281,6 +316,12 @@ impl<'a, F: FnMut(Link) -> Result<(), CalibrationError>> Maker<'a, F> {
             let root = DMatrix::from_diagonal_element(3, 3, remainder);
             let effect = Effect::Stated(BudgetSource::Pulses);
             self.pending.drive(effect, self.dwell - 1, turn, &root);
+        }
+        if let Some(first) = states.magnetic {
+            let sigma = [model.magnetic.disturbance / model.magnetic.magnitude[0]; 3];
+            let effect = Effect::Noise(Source::MagneticDisturbance);
+            let place = self.dwell - 1;
+            self.renew_at(place, first, (&still, &sigma), effect);
         }
         if rest.new_position {
             if let Some(table) = states.table {
