@@ -50,7 +50,7 @@ pub use error::{CalibrationError, ComparisonError};
 pub use estimate::{Epoch, Estimate};
 pub use estimator::estimate;
 pub use linearisation::{AttitudePrior, Linearisation};
-pub use magnetometer::{MagneticEstimate, MagneticPrior};
+pub use magnetometer::{MagneticEstimate, MagneticPrior, ellipsoid};
 pub use model::Model;
 pub use noise::{NoisePolicy, NoiseReport, NoiseTest, Source, SourceFigures};
 pub use options::Options;

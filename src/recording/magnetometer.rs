@@ -132,13 +132,14 @@ impl Magnetometer {
     /// Noise in these dwells: the median variance, and the correlation of all.
     pub fn noise(&self, dwells: impl Iterator<Item = Range<f64>>) -> MagneticNoise {
         let mut variances = [(); 3].map(|()| Vec::new());
-        let mut products = [0.0; LAGS];
+        let (mut products, mut pairs) = ([0.0; LAGS], 0u32);
         for time in dwells {
             let means = self.means(&time);
             let (mean, variance) = moments(&means);
             if means.len() < 3 {
                 continue;
             }
+            pairs += 3 * means.len() as u32;
             for axis in 0..3 {
                 variances[axis].push(variance[axis]);
                 // A dwell with motion must not hide the correlation of the others.
@@ -150,11 +151,13 @@ impl Magnetometer {
                 }
             }
         }
-        let positive = products[1..].iter().map(|sum| sum / products[0]);
-        let positive = positive.take_while(|&correlation| correlation > 0.0);
+        // The correlation of white noise is beyond this with p < 0.3 %.
+        let chance = 3.0 / f64::from(pairs.max(1)).sqrt();
+        let significant = products[1..].iter().map(|sum| sum / products[0]);
+        let significant = significant.take_while(|&correlation| correlation > chance);
         MagneticNoise {
             variance: Vector3::from(variances.map(|mut of| median(&mut of).unwrap_or(0.0))),
-            correlation: 1.0 + 2.0 * positive.sum::<f64>(),
+            correlation: 1.0 + 2.0 * significant.sum::<f64>(),
         }
     }
 
@@ -168,8 +171,11 @@ impl Magnetometer {
             let sum = FREEDOM * noise.variance[axis] + known * own[axis];
             let variance = sum / (FREEDOM + known);
             let rounding = rounding(self.step[axis], variance);
-            let correlated = noise.correlation.min(count.max(1.0));
-            (variance * correlated / count + rounding + FLOOR.powi(2)).sqrt()
+            // The mean of a correlated series hides a part of its variance.
+            let correlation = noise.correlation.min(0.5 * (count + 1.0));
+            let hidden = ((count - 1.0) / (count - correlation)).max(1.0);
+            let of_noise = variance * hidden * correlation / count;
+            (of_noise + rounding + FLOOR.powi(2)).sqrt()
         };
         (!means.is_empty()).then(|| MagneticMean {
             output,

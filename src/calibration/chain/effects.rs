@@ -93,6 +93,13 @@ impl Sizes {
         self.events.iter().map(|(&event, &factor)| (event, factor))
     }
 
+    /// A copy with the variance of each event of an effect multiplied by a factor.
+    pub fn scaled(mut self, effect: Effect, factor: f64) -> Self {
+        let events = self.events.iter_mut().filter(|((of, _), _)| *of == effect);
+        events.for_each(|(_, variance)| *variance *= factor);
+        self
+    }
+
     /// A copy in which every effect has the size with which the links were made.
     pub fn of_events_alone(&self) -> Self {
         Self {

@@ -2,6 +2,7 @@
 
 use serde_json::json;
 
+use crate::calibration::magnetometer::Alone;
 use crate::calibration::{
     Finding, FindingKind as Kind, MagneticEstimate, Outcome, Problem, Source,
 };
@@ -21,13 +22,38 @@ pub fn magnetic(problem: &Problem, outcome: &Outcome) -> Vec<Finding> {
         return Vec::new();
     }
     let Some(found) = &outcome.magnetic else {
-        let text = "The dwells do not determine the magnetometer, so turncal did not calibrate it. Add dwells with each \
-                    axis up and down, away from steel and currents."
-            .to_owned();
-        return vec![Finding::new(Kind::MagnetometerNotObserved, text, json!({}))];
+        return vec![not_observed()];
     };
     let each = [varies(problem, outcome), unlikely(problem, found)];
     each.into_iter().flatten().collect()
+}
+
+/// Findings on a magnetometer without gyros.
+pub fn alone(problem: &Problem, found: Option<&Alone>) -> Vec<Finding> {
+    if !problem.model.magnetic.is_on() {
+        return Vec::new();
+    }
+    let Some(found) = found else {
+        return vec![not_observed()];
+    };
+    let (square, freedom) = found.squares;
+    let ratio = three_digits((square / freedom).sqrt());
+    let text = format!(
+        "The field or its angle to gravity changes from dwell to dwell by {ratio} times the noise, so the field depends \
+         on the place where the instrument is held. turncal widened the σ of the magnetometer by this factor. Record \
+         away from steel and currents, and keep the instrument at one place."
+    );
+    let is_large = square > chi_square_limit(freedom, FALSE_ALARM);
+    let figures = json!({ "chi_square": square, "freedom": freedom });
+    let varies = is_large.then(|| Finding::new(Kind::FieldVaries, text, figures));
+    let each = [varies, unlikely(problem, &found.estimate)];
+    each.into_iter().flatten().collect()
+}
+
+fn not_observed() -> Finding {
+    let text = "The dwells do not determine the magnetometer, so turncal did not calibrate it. Add dwells with each axis up \
+                and down, away from steel and currents.";
+    Finding::new(Kind::MagnetometerNotObserved, text.to_owned(), json!({}))
 }
 
 /// The finding, if the field depends on the place where the instrument is held.

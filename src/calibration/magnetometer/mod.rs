@@ -1,13 +1,13 @@
 //! The magnetometer in the chain of dwells: prior, start, rows and estimate.
 
+mod alone;
 mod estimate;
 mod prior;
-mod rows;
 mod start;
 #[cfg(test)]
 mod tests;
 
+pub use alone::{Alone, AtRest, Up, ellipsoid};
 pub use estimate::MagneticEstimate;
 pub use prior::MagneticPrior;
-pub use rows::MagneticRows;
 pub use start::with_magnetometer;

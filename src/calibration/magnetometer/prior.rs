@@ -1,6 +1,7 @@
 //! Prior of a magnetometer and of the field at its site.
 
 use crate::magnetic::{LocalField, MagneticTriad, MagneticVector};
+use crate::recording::Magnetometer;
 use crate::run::Run;
 use nalgebra::{Matrix3, Vector2, Vector3};
 
@@ -25,9 +26,12 @@ pub struct MagneticPrior {
 impl MagneticPrior {
     /// The prior of a run.
     pub fn new(run: &Run) -> Self {
-        let Some(magnetometer) = &run.recording.magnetometer else {
-            return Self::default();
-        };
+        let log = run.recording.magnetometer.as_ref();
+        log.map(Self::of_log).unwrap_or_default()
+    }
+
+    /// The prior of a magnetometer.
+    pub fn of_log(magnetometer: &Magnetometer) -> Self {
         let field = magnetometer.field.unwrap_or_else(LocalField::unknown);
         let vector = |matrix, bias, of: &Vector3<f64>| {
             let (bias, angles) = (Vector3::repeat(bias), Vector2::new(of.y, of.z));

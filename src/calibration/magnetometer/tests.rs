@@ -7,13 +7,14 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
+use crate::calibration::start::gravity_alone::standing;
 use crate::calibration::{
-    EventKind, FindingKind, Options, Outcome, PARAMETERS, Problem, UNWATCHED, bound, estimate,
-    in_general_form, mean_square_interval, nees, to_vector,
+    EventKind, FindingKind, Options, Outcome, PARAMETERS, Problem, UNWATCHED, bound, ellipsoid,
+    estimate, in_general_form, mean_square_interval, nees, to_vector,
 };
 use crate::earth::Site;
 use crate::imu::{BodyFrame, Output};
-use crate::magnetic::{LocalField, MAGNETIC, MagneticVector};
+use crate::magnetic::{LocalField, MAGNETIC, MagneticTriad, MagneticVector};
 use crate::models::{Instrument, Place, path_by_hand};
 use crate::recording::Magnetometer;
 use crate::run::{Aiding, Run};
@@ -56,6 +57,16 @@ fn magnetometer(site: &Site) -> MagnetometerModel {
         field: [field.mean, field.sigma],
         date: Some((2026, 5, 1)),
     }
+}
+
+/// Turns about each axis while it is vertical: gravity shows none of them.
+fn about_the_vertical() -> Path {
+    let faces = ["x_up", "y_up", "z_up", "x_down", "y_down", "z_down"];
+    let turns = |face: &str| {
+        let turn = format!("turn {} 120", &face[..1]);
+        format!("{face}, {turn}, {turn}")
+    };
+    path_by_hand(&faces.map(turns).join(", ")).unwrap()
 }
 
 fn scenario(hand: bool) -> Scenario {
@@ -191,12 +202,12 @@ fn a_magnetometer_turned_about_one_axis_only_is_not_calibrated() {
 
 /// Figures over many runs.
 struct Study {
-    /// NEES/n of the magnetometer and of the triads.
-    nees: [f64; 2],
+    /// NEES/n of the magnetometer, and of the triads without it and with it.
+    nees: [f64; 3],
     /// RMS error over the bound, of matrix, bias and angles.
     over_bound: [f64; 3],
-    /// RMS of errors of gyro K and E without the magnetometer over that with it.
-    gain: [f64; 2],
+    /// RMS of errors of gyro K, E and D without the magnetometer over that with it.
+    gain: [f64; 3],
     /// Largest error in σ, number of named dwells and of runs.
     largest: f64,
     named: usize,
@@ -206,14 +217,14 @@ struct Study {
 impl Study {
     fn of(scenario: &Scenario, runs: u64) -> Self {
         let mut study = Self {
-            nees: [0.0; 2],
+            nees: [0.0; 3],
             over_bound: [0.0; 3],
-            gain: [0.0; 2],
+            gain: [0.0; 3],
             largest: 0.0,
             named: 0,
             runs: runs as usize,
         };
-        let (mut ratios, mut squares) = ([0.0; 3], [[0.0; 2]; 2]);
+        let (mut ratios, mut squares) = ([0.0; 3], [[0.0; 3]; 2]);
         for number in 0..runs {
             let simulated = scenario.simulate(11, number).unwrap();
             let outcome = solved(scenario, &simulated.run);
@@ -224,11 +235,12 @@ impl Study {
                 .largest
                 .max(error.component_div(&found.sigma()).amax());
             study.named += named(&outcome).len();
-            let bound = bound(
-                &problem(&simulated.run, scenario.body_frame),
-                &simulated.truth,
-                &simulated.terms,
-            );
+            // The bound knows how large disturbances usually are.
+            let mut known = simulated.run.clone();
+            let log = known.recording.magnetometer.as_mut().unwrap();
+            log.disturbance = scenario.magnetometer.as_ref().unwrap().disturbance;
+            let known = problem(&known, scenario.body_frame);
+            let bound = bound(&known, &simulated.truth, &simulated.terms);
             let bound = bound.unwrap().magnetic.unwrap().sigma();
             for (ratio, of) in ratios.iter_mut().zip([0..9, 9..12, 12..14]) {
                 let own = of.clone().map(|k| (error[k] / bound[k]).powi(2));
@@ -243,15 +255,14 @@ impl Study {
                 let error = estimate.vector() - truth;
                 squares[k][0] += error.rows_range(0..3).norm_squared();
                 squares[k][1] += error.rows_range(3..9).norm_squared();
-                if k == 1 {
-                    let all: Vec<usize> = (0..PARAMETERS).collect();
-                    let nees = crate::calibration::nees(&error, &estimate.covariance, &all);
-                    study.nees[1] += nees.unwrap().mean / runs as f64;
-                }
+                squares[k][2] += error.rows_range(9..12).norm_squared();
+                let all: Vec<usize> = (0..PARAMETERS).collect();
+                let nees = crate::calibration::nees(&error, &estimate.covariance, &all);
+                study.nees[1 + k] += nees.unwrap().mean / runs as f64;
             }
         }
         study.over_bound = ratios.map(f64::sqrt);
-        study.gain = [0, 1].map(|k: usize| (squares[0][k] / squares[1][k]).sqrt());
+        study.gain = [0, 1, 2].map(|k: usize| (squares[0][k] / squares[1][k]).sqrt());
         study
     }
 }
@@ -262,36 +273,95 @@ impl Study {
 fn sigma_are_true_and_errors_at_the_bound_over_many_runs() {
     let runs = std::env::var("MAG_RUNS").map_or(100, |runs| runs.parse().unwrap());
     let mut wrong = Vec::new();
-    for (hand, other, disturbance) in [
-        (true, false, 0.0),
-        (true, true, 0.0),
-        (false, false, 0.0),
-        (false, true, 0.0),
-        (true, false, 1e-6),
-        (false, true, 1e-6),
+    for (name, hand, other, disturbance) in [
+        ("by hand", true, false, 0.0),
+        ("by hand, hobby", true, true, 0.0),
+        ("table", false, false, 0.0),
+        ("table, hobby", false, true, 0.0),
+        ("about the vertical", true, false, 0.0),
+        ("by hand, disturbed", true, false, 1e-6),
+        ("table, hobby, disturbed", false, true, 1e-6),
     ] {
         let mut scenario = scenario(hand);
         if other {
             scenario = hobby(scenario);
         }
+        if name == "about the vertical" {
+            scenario = scenario.along(about_the_vertical(), name).unwrap();
+        }
         scenario.magnetometer.as_mut().unwrap().disturbance = disturbance;
         let study = Study::of(&scenario, runs);
         println!(
-            "hand {hand}, other {other}, disturbance {disturbance:e}: NEES/n {:.3?}, over bound {:.3?}, gain {:.3?}, \
-             largest {:.2} σ, {} named in {} runs",
+            "{name}: NEES/n {:.3?}, over bound {:.3?}, gain {:.3?}, largest {:.2} σ, {} named in {} runs",
             study.nees, study.over_bound, study.gain, study.largest, study.named, study.runs
         );
-        // Means of 14 n squares.
+        // Means of 14 squares a run.
         let (low, high) = mean_square_interval(14 * runs as usize, 1e-4);
         if disturbance == 0.0 && !(low..high).contains(&study.nees[0]) {
-            wrong.push(format!("{hand} {other} {disturbance}"));
+            wrong.push(format!("{name}: {:?}", study.nees));
         }
         if study.gain.iter().any(|gain| *gain < 0.98) {
-            wrong.push(format!(
-                "{hand} {other} {disturbance}: gain {:?}",
-                study.gain
-            ));
+            wrong.push(format!("{name}: {:?}", study.gain));
         }
     }
     assert!(wrong.is_empty(), "{wrong:?}");
+}
+
+#[test]
+fn without_gyros_gravity_gives_the_magnetometer_in_the_frame_of_the_accelerometers() {
+    let scenario = scenario(true);
+    let mut squares = Vec::new();
+    for run in 0..12 {
+        let simulated = scenario.simulate(3, run).unwrap();
+        let problem = problem(&simulated.run, BodyFrame::Accelerometer);
+        // Gravity at rest does not use the moves, so the gyros have no part in it.
+        let standing = standing(&problem).unwrap();
+        assert!(standing.count > 25, "{}", standing.count);
+        let found = standing.magnetic.unwrap();
+        let (truth, _) = simulated.magnetic.unwrap();
+        let error = found.triad.vector() - truth.vector();
+        let all: Vec<usize> = (0..MAGNETIC).filter(|&k| k != 12).collect();
+        let nees = nees(
+            &DVector::from_column_slice(error.as_slice()),
+            &found.covariance,
+            &all,
+        );
+        squares.push(nees.unwrap().mean);
+    }
+    let mean = squares.iter().sum::<f64>() / squares.len() as f64;
+    let (low, high) = mean_square_interval(13 * squares.len(), 1e-4);
+    assert!((low..high).contains(&mean), "{mean}: {squares:?}");
+}
+
+#[test]
+fn a_magnetometer_alone_gives_its_ellipsoid_with_true_sigma() {
+    let scenario = scenario(true);
+    let mut squares = Vec::new();
+    for run in 0..12 {
+        let simulated = scenario.simulate(5, run).unwrap();
+        let log = simulated.run.recording.magnetometer.as_ref().unwrap();
+        let found = ellipsoid(log).unwrap();
+        let (truth, _) = simulated.magnetic.unwrap();
+        // The ellipsoid determines the matrix up to a rotation of its input.
+        let lower = (truth.matrix * truth.matrix.transpose())
+            .cholesky()
+            .unwrap()
+            .l();
+        let truth = MagneticTriad {
+            matrix: lower,
+            ..truth
+        };
+        let mut error = found.triad.vector() - truth.vector();
+        error.rows_range_mut(12..).fill(0.0);
+        let all: Vec<usize> = (0..12).collect();
+        let nees = nees(
+            &DVector::from_column_slice(error.as_slice()),
+            &found.covariance,
+            &all,
+        );
+        squares.push(nees.unwrap().mean);
+    }
+    let mean = squares.iter().sum::<f64>() / squares.len() as f64;
+    let (low, high) = mean_square_interval(9 * squares.len(), 1e-4);
+    assert!((low..high).contains(&mean), "{mean}: {squares:?}");
 }

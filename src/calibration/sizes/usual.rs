@@ -13,8 +13,9 @@ pub const LOG_SIGMA: f64 = 1.098_612_288_668_109_8;
 const LOG_SIGMA_NOT_STATED: f64 = std::f64::consts::LN_10;
 /// Default correlation time of a bias, s.
 const CORRELATION_TIME: f64 = 100.0;
-/// Usual disturbance of the magnetic field in a room, T.
-const DISTURBANCE: f64 = 1e-6;
+/// Usual disturbance of the magnetic field, T: the Earth's field itself varies by tens of nanotesla within hours on a
+/// quiet day (Campbell, *Introduction to Geomagnetic Fields*, 2nd ed., ch. 2); a building is found by the data.
+const DISTURBANCE: f64 = 2e-9;
 /// Usual differences between recordings, divided by the prior σ of an instrument.
 const DIFFERENCE: f64 = 0.1;
 

@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::given::Given;
 use super::link::Link;
+use super::magnetic::magnetic;
 use super::rows::Rows;
 use super::transition::Transition;
 use crate::attitude::skew;
@@ -13,7 +14,6 @@ use crate::calibration::chain::effects::{Dispersion, Effect, Slip};
 use crate::calibration::chain::part::{PartFilter, filter_of, part_filters};
 use crate::calibration::chain::short_rows::factor;
 use crate::calibration::chain::states::{ATTITUDE, NAVIGATION, POSITION, States, VELOCITY};
-use crate::calibration::magnetometer::MagneticRows;
 use crate::calibration::record::{Event, Rest, between};
 use crate::calibration::several::day_to_day::OwnState;
 use crate::calibration::{CalibrationError, Constant, Group, Problem, Script, Source, Stretch};
@@ -237,8 +237,12 @@ impl<'a, F: FnMut(Link) -> Result<(), CalibrationError>> Maker<'a, F> {
             Transition::identity(n, self.dynamics.constants.len()),
         );
         let rows = given.rows(&part).and(place);
-        let rows = match self.magnetic(rest) {
-            Some(magnetic) => magnetic.and(rows),
+        let weight = model.weight(BudgetSource::MagneticNoise);
+        let rows = match magnetic(&self.dynamics, rest, weight) {
+            Some((magnetic, log_determinant)) => {
+                self.log_determinant += log_determinant;
+                magnetic.and(rows)
+            }
             None => rows,
         };
         if !rows.values.iter().all(|value| value.is_finite()) {
@@ -262,23 +266,6 @@ impl<'a, F: FnMut(Link) -> Result<(), CalibrationError>> Maker<'a, F> {
             .map(|step| rest.models[step.model].duration);
         self.vary(duration.sum(), self.dwell - 1);
         Ok(())
-    }
-
-    /// Rows of the magnetometer in a part, if it is observed there.
-    fn magnetic(&mut self, rest: &Rest) -> Option<Rows> {
-        let weight = self.problem.model.weight(BudgetSource::MagneticNoise);
-        let Dynamics {
-            states, constants, ..
-        } = self.dynamics;
-        let seen = (rest.magnetic.as_ref()?, weight);
-        let at = self.dynamics.magnetic.as_ref()?;
-        let of = MagneticRows::new(seen, &rest.begin.attitude, at, (states, constants));
-        self.log_determinant += of.log_determinant;
-        Some(Rows {
-            states: of.states,
-            constants: of.constants,
-            values: of.values,
-        })
     }
 
     /// Refers the states to the beginning of a part. If the body came to rest at a new position, the table position is

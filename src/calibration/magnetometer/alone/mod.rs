@@ -1,0 +1,241 @@
+//! A magnetometer without gyros: from the magnitude of the field and, with accelerometers, its angle to gravity at rest.
+//!
+//! In each dwell the field has an unknown direction. With gravity, only its rotation about the vertical is unknown,
+//! because all dwells have one inclination; without gravity, the matrix is lower triangular by convention.
+
+mod start;
+
+use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
+
+use super::{MagneticEstimate, MagneticPrior};
+use crate::calibration::constants::inverse;
+use crate::magnetic::{MAGNETIC, MagneticTriad, MagneticVector};
+use crate::recording::{MagneticMean, Magnetometer};
+
+/// Maximum number of iterations.
+const STEPS: usize = 50;
+/// A smaller step, in σ, ends the iterations.
+const SETTLED: f64 = 0.01;
+/// Usual 1σ of a value, T, before the residuals show it.
+const USUAL_NOISE: f64 = 1e-7;
+/// 1σ of the inclination, rad, below which its sign is known.
+const HEMISPHERE: f64 = 0.5;
+/// Constants that are estimated with gravity: all but the declination; and without: six of the matrix, and the bias.
+const WITH_GRAVITY: [usize; 13] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 13];
+const WITHOUT: [usize; 9] = [0, 3, 4, 6, 7, 8, 9, 10, 11];
+
+/// Mean output at rest, and Up along body axes if accelerometers show it.
+#[derive(Debug, Clone)]
+pub struct AtRest {
+    /// Output of the magnetometer.
+    pub mean: MagneticMean,
+    /// Direction of gravity.
+    pub up: Option<Up>,
+}
+
+/// Up along body axes.
+#[derive(Debug, Clone)]
+pub struct Up {
+    /// Unit vector.
+    pub direction: Vector3<f64>,
+    /// 1σ of its own tilt about each axis, rad.
+    pub tilt: f64,
+    /// Change per error that all dwells have in common, each with σ = 1, one column each.
+    pub by_common: DMatrix<f64>,
+}
+
+/// A magnetometer from means at rest.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Alone {
+    /// The estimate; its σ are multiplied by the Birge ratio if it exceeds one.
+    pub estimate: MagneticEstimate,
+    /// Sum of squared normalised residuals, and its degrees of freedom.
+    pub squares: (f64, f64),
+}
+
+impl Alone {
+    /// The magnetometer, from an ellipsoid and Gauss–Newton steps; `None` if the means do not determine it.
+    pub fn new(rests: &[AtRest], prior: &MagneticPrior) -> Option<Self> {
+        let with_gravity = rests.iter().all(|rest| rest.up.is_some());
+        let free: &[usize] = if with_gravity {
+            &WITH_GRAVITY
+        } else {
+            &WITHOUT
+        };
+        let mut triad = start::ellipsoid(rests, with_gravity)?;
+        triad.angles.x = prior.angles().x;
+        // A field and a matrix of opposite signs explain the same output.
+        if prior.sigma[MAGNETIC - 1] < HEMISPHERE && prior.angles().y * triad.angles.y < 0.0 {
+            triad.matrix = -triad.matrix;
+            triad.angles.y = -triad.angles.y;
+        }
+        for _ in 0..STEPS {
+            let Solved {
+                step,
+                covariance,
+                squares,
+            } = solved(rests, &triad, (prior, free))?;
+            triad = MagneticTriad::from_vector(&(triad.vector() + step));
+            let sigma = covariance.diagonal().map(f64::sqrt);
+            let moved = free.iter().map(|&k| (step[k] / sigma[k]).abs());
+            if moved.fold(0.0, f64::max) < SETTLED {
+                let birge = (squares.0 / squares.1).max(1.0);
+                let estimate = MagneticEstimate {
+                    triad,
+                    magnitude: prior.magnitude,
+                    covariance: covariance * birge,
+                    cross: SMatrix::zeros(),
+                };
+                return Some(Self { estimate, squares });
+            }
+        }
+        None
+    }
+}
+
+/// A magnetometer from its own values alone: each span of the log is one, whatever the motion. The noise is that of the
+/// residuals. `None` if the values do not cover the sphere.
+pub fn ellipsoid(log: &Magnetometer) -> Option<MagneticEstimate> {
+    let prior = MagneticPrior::of_log(log);
+    let rest = |(_, value): (f64, Vector3<f64>)| AtRest {
+        mean: MagneticMean {
+            output: value / log.nominal,
+            sigma: Vector3::repeat(USUAL_NOISE),
+        },
+        up: None,
+    };
+    let rests: Vec<AtRest> = log.values().map(rest).collect();
+    let Alone {
+        mut estimate,
+        squares,
+    } = Alone::new(&rests, &prior)?;
+    let birge = squares.0 / squares.1;
+    estimate.covariance *= birge / birge.max(1.0);
+    Some(estimate)
+}
+
+/// A Gauss–Newton step.
+struct Solved {
+    step: MagneticVector,
+    covariance: SMatrix<f64, MAGNETIC, MAGNETIC>,
+    squares: (f64, f64),
+}
+
+fn solved(
+    rests: &[AtRest],
+    triad: &MagneticTriad,
+    (prior, free): (&MagneticPrior, &[usize]),
+) -> Option<Solved> {
+    let commons = rests
+        .first()?
+        .up
+        .as_ref()
+        .map_or(0, |up| up.by_common.ncols());
+    let n = free.len() + commons;
+    let (mut normal, mut right) = (DMatrix::identity(n, n), DVector::zeros(n));
+    let now = triad.vector();
+    for (place, &k) in free.iter().enumerate() {
+        let weight = prior.sigma[k].powi(-2);
+        normal[(place, place)] = weight;
+        right[place] = weight * (prior.mean[k] - now[k]);
+    }
+    let (mut squares, mut count) = (0.0, 0);
+    for rest in rests {
+        let rows = Rows::new(rest, triad, commons)?;
+        let places = free.iter().copied().chain(MAGNETIC..MAGNETIC + commons);
+        let columns = rows
+            .columns
+            .select_columns(places.collect::<Vec<_>>().iter());
+        normal += columns.tr_mul(&columns);
+        right += columns.tr_mul(&rows.values);
+        squares += rows.values.norm_squared();
+        count += rows.freedom;
+    }
+    let (of_all, _) = inverse(&normal)?;
+    let solution = &of_all * &right;
+    let mut step = SVector::zeros();
+    let mut covariance = SMatrix::zeros();
+    for (place, &k) in free.iter().enumerate() {
+        step[k] = solution[place];
+        for (other, &j) in free.iter().enumerate() {
+            covariance[(k, j)] = of_all[(place, other)];
+        }
+    }
+    Some(Solved {
+        step,
+        covariance,
+        squares: (squares, (count as f64 - free.len() as f64).max(1.0)),
+    })
+}
+
+/// Whitened rows of one mean, without the unknown direction of the field.
+struct Rows {
+    columns: DMatrix<f64>,
+    values: DVector<f64>,
+    freedom: usize,
+}
+
+impl Rows {
+    fn new(rest: &AtRest, triad: &MagneticTriad, commons: usize) -> Option<Self> {
+        let MagneticTriad {
+            matrix,
+            bias,
+            angles,
+        } = triad;
+        let output = &rest.mean.output;
+        let seen = (matrix.try_inverse()? * (output - bias)).try_normalize(0.0)?;
+        let (sin, cos) = angles.y.sin_cos();
+        let mut covariance = Matrix3::from_diagonal(&rest.mean.sigma.map(|sigma| sigma * sigma));
+        let mut by_common = DMatrix::zeros(3, commons);
+        let mut by_inclination = Vector3::zeros();
+        let (field, unknown) = match &rest.up {
+            None => (seen, across(&seen).to_vec()),
+            Some(up) => {
+                let level = (seen - up.direction * seen.dot(&up.direction)).try_normalize(1e-9)?;
+                let field = level * cos - up.direction * sin;
+                by_inclination = -level * sin - up.direction * cos;
+                for axis in across(&up.direction) {
+                    let tilted = matrix * axis.cross(&field) * up.tilt;
+                    covariance += tilted * tilted.transpose();
+                }
+                for (k, change) in up.by_common.column_iter().enumerate() {
+                    let change = Vector3::new(change[0], change[1], change[2]);
+                    let turned = up.direction.cross(&change).cross(&field);
+                    by_common.set_column(k, &(matrix * turned));
+                }
+                (field, vec![up.direction.cross(&field)])
+            }
+        };
+        let mut columns = DMatrix::zeros(3, MAGNETIC + commons);
+        for row in 0..3 {
+            (0..3).for_each(|k| columns[(row, 3 * row + k)] = field[k]);
+            columns[(row, 9 + row)] = 1.0;
+        }
+        columns.set_column(MAGNETIC - 1, &(matrix * by_inclination));
+        columns.columns_mut(MAGNETIC, commons).copy_from(&by_common);
+        let root = Cholesky::new(covariance)?.l();
+        let mut values = root.solve_lower_triangular(&(output - matrix * field - bias))?;
+        let mut columns = root.solve_lower_triangular(&columns)?;
+        let unknown =
+            Matrix3::from_fn(|row, k| unknown.get(k).map_or(0.0, |of| (matrix * of)[row]));
+        let count = if rest.up.is_some() { 1 } else { 2 };
+        let directions = root.solve_lower_triangular(&unknown)?.svd(true, false).u?;
+        for direction in directions.column_iter().take(count) {
+            values -= direction * direction.dot(&values);
+            let along = direction.tr_mul(&columns);
+            columns -= direction * along;
+        }
+        Some(Self {
+            columns,
+            values: DVector::from_column_slice(values.as_slice()),
+            freedom: 3 - count,
+        })
+    }
+}
+
+/// Two unit vectors perpendicular to a unit vector and to each other.
+fn across(axis: &Vector3<f64>) -> [Vector3<f64>; 2] {
+    let other = Vector3::ith(axis.iamin(), 1.0);
+    let first = axis.cross(&other).normalize();
+    [first, axis.cross(&first)]
+}
