@@ -86,7 +86,7 @@ pub fn bound_without_moves(
     let bound = Bound {
         observability: Observability::new(&estimate, &prior_sigma, &across),
         auxiliary: auxiliary_of(posterior, &script.at, &problem.model, |_| true),
-        magnetic: MagneticEstimate::new(posterior, &script.at, problem.model.magnetic.magnitude),
+        magnetic: MagneticEstimate::new(posterior, &script.at, &problem.model),
         prior_sigma,
         estimate,
         history,

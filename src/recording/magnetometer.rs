@@ -169,7 +169,8 @@ impl Magnetometer {
         let of_mean = |axis: usize| {
             let known = (count - 1.0).max(0.0);
             let sum = FREEDOM * noise.variance[axis] + known * own[axis];
-            let variance = sum / (FREEDOM + known);
+            // The mean of the inverse gamma distribution of the variance.
+            let variance = sum / (FREEDOM + known - 2.0);
             let rounding = rounding(self.step[axis], variance);
             // The mean of a correlated series hides a part of its variance.
             let correlation = noise.correlation.min(0.5 * (count + 1.0));

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, SMatrix};
 
 use crate::calibration::constants::parameters;
-use crate::calibration::{Constant, Linearisation, PARAMETERS, Posterior};
+use crate::calibration::{Constant, Linearisation, Model, PARAMETERS, Posterior};
 use crate::magnetic::{MAGNETIC, MagneticTriad, MagneticVector};
 
 /// Covariance of the constants of a magnetometer.
@@ -27,7 +27,7 @@ impl MagneticEstimate {
     pub(in crate::calibration) fn new(
         posterior: &Posterior,
         at: &Linearisation,
-        magnitude: [f64; 2],
+        model: &Model,
     ) -> Option<Self> {
         let mut values = at.magnetic?;
         let constants = posterior.constants.iter().enumerate();
@@ -49,7 +49,7 @@ impl MagneticEstimate {
         }
         Some(Self {
             triad: MagneticTriad::from_vector(&values),
-            magnitude,
+            magnitude: model.magnetic.magnitude,
             covariance,
             cross,
         })

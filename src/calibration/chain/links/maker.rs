@@ -268,6 +268,16 @@ impl<'a, F: FnMut(Link) -> Result<(), CalibrationError>> Maker<'a, F> {
         Ok(())
     }
 
+    /// Renews the disturbance of the magnetic field for the dwell that begins.
+    fn disturb_field(&mut self) {
+        if let Some(first) = self.dynamics.states.magnetic {
+            let model = &self.problem.model.magnetic;
+            let sigma = [model.disturbance / model.magnitude[0]; 3];
+            let effect = Effect::Noise(Source::MagneticDisturbance);
+            self.renew_at(self.dwell - 1, first, (&[0.0; 3], &sigma), effect);
+        }
+    }
+
     /// Refers the states to the beginning of a part. If the body came to rest at a new position, the table position is
     /// reset and the position is observed.
     fn begin_part(&mut self, rest: &Rest, stretch: &Stretch) -> Rows {
@@ -304,12 +314,7 @@ impl<'a, F: FnMut(Link) -> Result<(), CalibrationError>> Maker<'a, F> {
             let effect = Effect::Stated(BudgetSource::Pulses);
             self.pending.drive(effect, self.dwell - 1, turn, &root);
         }
-        if let Some(first) = states.magnetic {
-            let sigma = [model.magnetic.disturbance / model.magnetic.magnitude[0]; 3];
-            let effect = Effect::Noise(Source::MagneticDisturbance);
-            let place = self.dwell - 1;
-            self.renew_at(place, first, (&still, &sigma), effect);
-        }
+        self.disturb_field();
         if rest.new_position {
             if let Some(table) = states.table {
                 self.pending.reset(table..table + 3, &still);
