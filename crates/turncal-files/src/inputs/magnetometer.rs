@@ -6,6 +6,7 @@ use nalgebra::Vector3;
 
 use crate::schema::Names;
 use crate::schema::instrument::Fields;
+use turncal::calibration::Source as NoiseSource;
 use turncal::earth::Site;
 use turncal::magnetic::LocalField;
 use turncal::recording::{ColumnFacts, ImuSamples, MAGNETIC_COUNT, Magnetometer};
@@ -13,8 +14,6 @@ use turncal_input::{FileError, list, suggestion};
 use turncal_logs::clock::{Clock, Stamp};
 use turncal_logs::{DataFile, Source};
 
-/// Key of the stated disturbance in `[imu.noise]`, and its unit in T.
-pub const DISTURBANCE: (&str, f64) = ("mag_disturbance_nt", 1e-9);
 /// Units with their number per tesla.
 const UNITS: [(&str, f64); 7] = [
     ("uT", 1e6),
@@ -63,9 +62,10 @@ impl<'a> Fields<'a> {
         let from = self.further(imu.mag_from.as_ref(), "imu.mag_from", (gyro, clock))?;
         let is_separate = from.is_some();
         let (source, clock) = from.unwrap_or_else(|| (gyro.clone(), clock));
-        let stated = imu.noise.get(DISTURBANCE.0).copied().flatten();
+        let (_, (key, of_key)) = NoiseSource::MagneticDisturbance.stated_in();
+        let stated = imu.noise.get(key).copied().flatten();
         let mut empty = Magnetometer::new(unit, *nominal);
-        empty.disturbance = stated.map_or(0.0, |stated| stated.0 * DISTURBANCE.1);
+        empty.disturbance = stated.map_or(0.0, |stated| stated.0 * of_key);
         empty.field = self.field(site);
         let instance = imu.instance.as_ref().filter(|_| !is_separate);
         Ok(Some(MagnetometerLog {

@@ -6,9 +6,9 @@ use nalgebra::Vector3;
 
 use super::{Names, RunFile};
 use crate::imu_log::ImuLog;
-use crate::inputs::magnetometer::DISTURBANCE;
 use crate::inputs::temperature::TemperatureColumns;
 use crate::quantity::units;
+use turncal::calibration::Source;
 use turncal::imu::{
     GaussMarkov, Instrument, MotionNoise, Noise, NoiseKeys, Nominal, Output, PerSensor, Prior,
     Sensor,
@@ -149,7 +149,8 @@ impl<'a> Fields<'a> {
         let unit = PerSensor::try_from_fn(|sensor| self.unit(sensor))?;
         let nominal = PerSensor::try_from_fn(|sensor| self.nominal(sensor, unit.get(sensor)))?;
         let names = Sensor::ALL.map(|sensor| NoiseKeys::of(sensor).names());
-        let names = [names.as_flattened(), &[DISTURBANCE.0]].concat();
+        let (_, (disturbance, _)) = Source::MagneticDisturbance.stated_in();
+        let names = [names.as_flattened(), &[disturbance]].concat();
         (self.document).only("imu.noise", imu.noise.keys(), &names)?;
         let noise = PerSensor::try_from_fn(|sensor| self.noise(sensor))?;
         let prior = PerSensor::try_from_fn(|sensor| self.prior(sensor, *nominal.get(sensor)))?;

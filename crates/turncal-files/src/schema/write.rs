@@ -121,7 +121,7 @@ fn imu_rows(file: &mut dyn Write, run: &Run, output: Output) -> io::Result<()> {
         }
         if let Some(mag) = &mut mag {
             // Each value is in the row of its time; the other rows have none.
-            match mag.next_if(|(time, _)| *time < imu.time(k) + period) {
+            match mag.next_if(|(time, _)| *time < imu.time(k) + 0.5 * period) {
                 Some((_, v)) => write!(file, ",{:e},{:e},{:e}", v.x, v.y, v.z)?,
                 None => write!(file, ",,,")?,
             }
