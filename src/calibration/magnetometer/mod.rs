@@ -2,6 +2,7 @@
 
 mod alone;
 mod estimate;
+mod homogeneous;
 mod prior;
 mod start;
 #[cfg(test)]
