@@ -3,6 +3,7 @@
 //! In each dwell the field has an unknown direction. With gravity, only its rotation about the vertical is unknown,
 //! because all dwells have one inclination; without gravity, the matrix is lower triangular by convention.
 
+mod at_rest;
 mod rows;
 mod start;
 
@@ -12,6 +13,7 @@ use super::{MagneticEstimate, MagneticPrior};
 use crate::calibration::constants::inverse;
 use crate::magnetic::{MAGNETIC, MagneticTriad, MagneticVector};
 use crate::recording::{MagneticMean, Magnetometer};
+pub use at_rest::{AtRest, Up};
 use rows::Rows;
 
 /// Maximum number of iterations.
@@ -25,26 +27,6 @@ const HEMISPHERE: f64 = 0.5;
 /// Constants that are estimated with gravity: all but the declination; and without: six of the matrix, and the bias.
 const WITH_GRAVITY: [usize; 13] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 13];
 const WITHOUT: [usize; 9] = [0, 3, 4, 6, 7, 8, 9, 10, 11];
-
-/// Mean output at rest, and Up along body axes if accelerometers show it.
-#[derive(Debug, Clone)]
-pub struct AtRest {
-    /// Output of the magnetometer.
-    pub mean: MagneticMean,
-    /// Direction of gravity.
-    pub up: Option<Up>,
-}
-
-/// Up along body axes.
-#[derive(Debug, Clone)]
-pub struct Up {
-    /// Unit vector.
-    pub direction: Vector3<f64>,
-    /// 1σ of its own tilt about each axis, rad.
-    pub tilt: f64,
-    /// Change per error that all dwells have in common, each with σ = 1, one column each.
-    pub by_common: DMatrix<f64>,
-}
 
 /// A magnetometer from means at rest.
 #[derive(Debug, Clone, PartialEq)]

@@ -2,7 +2,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Vector3};
 
-use super::AtRest;
+use super::at_rest::AtRest;
 use crate::magnetic::{MAGNETIC, MagneticTriad};
 
 /// Whitened rows of one mean, without the unknown direction of the field.

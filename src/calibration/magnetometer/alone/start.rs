@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector2, Vector3};
 
-use super::AtRest;
+use super::at_rest::AtRest;
 use crate::magnetic::MagneticTriad;
 
 /// Smallest singular value of the equations, relative to the largest.
