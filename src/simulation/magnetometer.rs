@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, Vector2, Vector3};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-use super::normal;
+use super::draw::normal;
 use crate::earth::Site;
 use crate::magnetic::{LocalField, MagneticTriad};
 use crate::recording::Magnetometer;

@@ -4,6 +4,7 @@
 //! from separate generators, so that a change of one does not affect the others.
 
 mod campaign;
+mod draw;
 mod drive;
 mod increments;
 mod magnetometer;
@@ -19,6 +20,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 pub use campaign::SimulatedCampaign;
+use draw::normal;
 use drive::Drive;
 pub use increments::{Integrator, true_increments};
 pub use magnetometer::MagnetometerModel;
@@ -141,10 +143,6 @@ const THERMAL: u64 = 0x7468_6572_6d61_6c21;
 const MAGNETIC: u64 = 0x6d61_676e_6574_6963;
 /// Interval in which temperature changes are negligible, s.
 const WARMED_EVERY: f64 = 0.1;
-
-fn normal(rng: &mut ChaCha8Rng) -> Vector3<f64> {
-    Vector3::from_fn(|_, _| StandardNormal.sample(rng))
-}
 
 impl Scenario {
     /// Simulates one run. The same seed and stream give the same bits; a Monte Carlo study keeps the seed
