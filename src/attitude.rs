@@ -39,13 +39,13 @@ pub fn exp(v: Vector3<f64>) -> Matrix3<f64> {
     )
 }
 
-/// The rotation vector in radians of a rotation matrix, of length at most π.
+/// The rotation vector in radians that corresponds to a rotation matrix; its length is at most π.
 pub fn log(c: &Matrix3<f64>) -> Vector3<f64> {
     quaternion(c).scaled_axis()
 }
 
-/// The rotation matrix nearest to `c`, which must already be a rotation matrix except for rounding
-/// (one step of Newton's iteration for the polar decomposition).
+/// The rotation matrix nearest to `c`, which must already be a rotation matrix apart from rounding errors (one step of
+/// Newton's iteration for the polar decomposition).
 #[inline]
 pub fn orthonormalised(c: &Matrix3<f64>) -> Matrix3<f64> {
     c * (Matrix3::identity() * 1.5 - c.tr_mul(c) * 0.5)
@@ -72,8 +72,8 @@ pub fn quaternion(c: &Matrix3<f64>) -> UnitQuaternion<f64> {
     UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(*c))
 }
 
-/// `C_b_n = Rz(−heading) Rx(pitch) Ry(roll)`: body right-front-up to East-North-Up, all in radians,
-/// heading clockwise from North.
+/// `C_b_n = Rz(−heading) Rx(pitch) Ry(roll)`, from body right-front-up to East-North-Up; all angles are in radians, and
+/// heading is clockwise from North.
 pub fn from_pitch_roll_heading(pitch: f64, roll: f64, heading: f64) -> Matrix3<f64> {
     let [(sp, cp), (sr, cr), (sh, ch)] = [pitch, roll, heading].map(f64::sin_cos);
     Matrix3::new(
@@ -89,8 +89,8 @@ pub fn from_pitch_roll_heading(pitch: f64, roll: f64, heading: f64) -> Matrix3<f
     )
 }
 
-/// Pitch, roll and heading in radians of `C_b_n`, the inverse of [`from_pitch_roll_heading`]. Pitch is
-/// within ±π/2, the others within ±π; at a pitch of ±π/2, roll and heading cannot be distinguished.
+/// Pitch, roll and heading of `C_b_n` in radians; the inverse of [`from_pitch_roll_heading`]. Pitch is within ±π/2,
+/// roll and heading are within ±π; at a pitch of ±π/2, roll and heading cannot be distinguished.
 pub fn to_pitch_roll_heading(c: &Matrix3<f64>) -> [f64; 3] {
     // Near ±π/2, the hypotenuse keeps digits that would be lost with an arcsine.
     [
@@ -119,14 +119,14 @@ pub fn level(up: &Vector3<f64>) -> Matrix3<f64> {
     ])
 }
 
-/// The rotation by a tilt about East and North and then by a heading about Up, the components of an attitude error φ in
-/// rad. If both are small, it is `exp([φ×])`. A heading error does not affect gravity, and in this form even a large
-/// heading error leaves the tilt unchanged.
+/// The rotation by a tilt about East and North, followed by a rotation by a heading about Up. The three angles are the
+/// components of an attitude error φ in rad. If both angles are small, the rotation is `exp([φ×])`. A heading error
+/// does not affect gravity, and in this form even a large heading error leaves the tilt unchanged.
 pub fn from_tilt_and_heading(error: &Vector3<f64>) -> Matrix3<f64> {
     exp(Vector3::z() * error.z) * exp(Vector3::new(error.x, error.y, 0.0))
 }
 
-/// Tilt about East and North and heading of a rotation, the inverse of [`from_tilt_and_heading`].
+/// The tilt about East and North and the heading of a rotation, the inverse of [`from_tilt_and_heading`].
 pub fn to_tilt_and_heading(c: &Matrix3<f64>) -> Vector3<f64> {
     let tilt = tilt(&c.row(2).transpose());
     let heading = c * exp(-tilt);

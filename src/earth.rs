@@ -1,4 +1,4 @@
-//! The Earth as seen by an instrument on it.
+//! Gravity and rotation of the Earth at the site of an instrument.
 //!
 //! WGS-84 (NIMA TR8350.2, 3rd ed., tables 3.1 and 3.4): ellipsoid, rotation rate and normal gravity
 //! (Somigliana's closed form, continued in height by TR8350.2 Eq. 4-3).
@@ -60,13 +60,13 @@ pub fn earth_rate_n(latitude: f64) -> Vector3<f64> {
     Vector3::new(0.0, ROTATION_RATE * c, ROTATION_RATE * s)
 }
 
-/// Radii of curvature of the ellipsoid in m. (The paper's Eq. 13 calls them polar and equatorial
-/// radius; meridian and prime vertical are meant.)
+/// Radii of curvature of the ellipsoid in m. (Eq. 13 of the paper calls the radii polar and equatorial, but it means
+/// the radii of the meridian and of the prime vertical.)
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Curvature {
-    /// Radius of the meridian, `R_M`: north and south.
+    /// Radius of curvature of the meridian, `R_M`, for motion north and south.
     pub meridian: f64,
-    /// Radius of the prime vertical, `R_N`: east and west.
+    /// Radius of curvature of the prime vertical, `R_N`, for motion east and west.
     pub prime_vertical: f64,
 }
 
@@ -100,15 +100,16 @@ impl Curvature {
 pub struct Site {
     /// Geodetic latitude in radians, north positive.
     pub latitude: f64,
-    /// Longitude in radians, east positive. It has no effect at rest.
+    /// Longitude in radians, east positive. The longitude has no effect at rest.
     pub longitude: f64,
     /// Height above the ellipsoid in m.
     pub height: f64,
     /// Magnitude of gravity in m/s², including the centrifugal part.
     pub gravity: f64,
-    /// 1σ in m/s². The scale factors of all three accelerometers share the gravity error.
+    /// 1σ in m/s². 1σ of gravity, m/s². The scale factors of all three accelerometers share the error of gravity.
     pub gravity_sigma: f64,
-    /// Whether the site is known; otherwise Earth rotation is zero with the σ of [`Site::earth_rate_sigma`].
+    /// Whether the site is known. If the site is not known, Earth rotation is zero with the σ given by
+    /// [`Site::earth_rate_sigma`].
     #[serde(default = "known")]
     pub is_known: bool,
 }
@@ -131,7 +132,8 @@ const FREE_AIR: f64 = 0.3086 * MILLIGAL;
 const ANYWHERE: (f64, f64) = (9.806, 0.015);
 
 impl Site {
-    /// An unknown site on the Earth; if a latitude is needed, it is that of mean gravity.
+    /// An unknown site on the Earth. Where a latitude is needed, the latitude at which gravity has its mean value is
+    /// used.
     pub fn unknown() -> Self {
         let (gravity, gravity_sigma) = ANYWHERE;
         Self {
@@ -144,7 +146,7 @@ impl Site {
         }
     }
 
-    /// A site with normal gravity; its σ is the usual anomaly.
+    /// A site with normal gravity, whose σ is the usual gravity anomaly.
     pub fn with_normal_gravity(latitude: f64, longitude: f64, height: f64) -> Self {
         Self {
             latitude,
@@ -191,7 +193,7 @@ impl Site {
         }
     }
 
-    /// 1σ of each component of Earth rotation, rad/s: if the site is unknown, the direction of the rotation is
+    /// 1σ of each component of Earth rotation, rad/s; if the site is unknown, the direction of the rotation is
     /// arbitrary.
     pub fn earth_rate_sigma(&self) -> f64 {
         if self.is_known {

@@ -1,5 +1,5 @@
-//! Statements of a calibration laboratory about itself, its customer and the item. They are not derived from data; a
-//! certificate shows them.
+//! Statements of a calibration laboratory about itself, its customer and the item. These statements are not derived
+//! from data; they appear in the certificate.
 
 use serde::Deserialize;
 
@@ -90,7 +90,7 @@ pub enum Place {
 }
 
 impl Place {
-    /// Spelling in the Digital Calibration Certificate.
+    /// The spelling used in the Digital Calibration Certificate.
     pub fn code(self) -> &'static str {
         match self {
             Self::Laboratory => "laboratory",
@@ -100,7 +100,7 @@ impl Place {
         }
     }
 
-    /// The place in words.
+    /// A description of the place in words.
     pub fn words(self) -> &'static str {
         match self {
             Self::Laboratory => "in the laboratory",
@@ -115,7 +115,7 @@ impl Place {
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Condition {
-    /// Value, in the unit of its field.
+    /// Value, in the unit of the field.
     pub value: f64,
     /// Expanded uncertainty, k = 2.
     pub uncertainty: f64,
@@ -137,22 +137,23 @@ pub struct Equipment {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum DecisionRule {
-    /// A limit is met if the value is inside it by at least the expanded uncertainty (guard band w = U).
+    /// A limit is met if the value is inside the limit by at least the expanded uncertainty (guard band w = U).
     GuardBand,
-    /// A limit is met if the value is within it.
+    /// A limit is met if the value is inside the limit.
     SimpleAcceptance,
 }
 
 impl DecisionRule {
-    /// The rule in words.
+    /// A description of the rule in words.
     pub fn words(self) -> &'static str {
         match self {
             Self::GuardBand => {
                 "guard band w = U (ILAC-G8): pass if the value is inside its limit by at least the expanded \
-                 uncertainty, fail if it is outside by at least that; between these, pass and fail are conditional"
+                 uncertainty, fail if it is outside its limit by at least the expanded uncertainty; otherwise the \
+                 pass or fail is conditional"
             }
             Self::SimpleAcceptance => {
-                "simple acceptance (ILAC-G8): pass if the value is within its limit, regardless of uncertainty"
+                "simple acceptance (ILAC-G8): pass if the value is within its limit, regardless of its uncertainty"
             }
         }
     }
@@ -228,7 +229,7 @@ pub struct Item {
 pub struct Method {
     /// Procedure of the laboratory.
     pub procedure: String,
-    /// Additions to the procedure, deviations or exclusions from it.
+    /// Additions to the procedure, and deviations or exclusions from it.
     pub deviations: Option<String>,
 }
 
@@ -248,7 +249,7 @@ pub struct Conditions {
 pub struct Traceability {
     /// Statement in the laboratory's own words.
     pub statement: String,
-    /// Equipment that provides it.
+    /// Equipment that provides the traceability.
     #[serde(default)]
     pub equipment: Vec<Equipment>,
 }

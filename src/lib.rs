@@ -1,5 +1,5 @@
-//! Calibration of an inertial measurement unit on a turntable: scale factors K, misalignment matrix E and
-//! biases D of gyros and accelerometers, with a σ of each.
+//! Calibration of an inertial measurement unit on a turntable: scale factors K, misalignment matrix E and biases D of
+//! gyros and accelerometers, each with its σ.
 //!
 //! An error-state extended Kalman filter runs a strapdown navigation solution through a recording and estimates the
 //! parameters from its errors at rest (velocity and table attitude). Passes over the whole recording, each linearised
@@ -26,8 +26,8 @@
 //! # Ok(())
 //! # }
 //! ```
-//! `examples/` has more programs: samples from arrays, both methods compared with a truth, a study of a path, rows as
-//! they arrive.
+//! `examples/` contains more programs: samples from arrays, a comparison of both methods with a truth, a study of a
+//! path, and calibration of rows as they arrive.
 //!
 //! # Frames, signs, units
 //! | what | convention |
@@ -41,13 +41,14 @@
 //! | units | SI and radians everywhere; [`units`] are for input and output |
 //!
 //! # Modules A [`recording::Recording`] holds only data. A [`run::Run`] adds prior knowledge: instrument, site, table.
-//! [`calibration::Options`] select the estimated quantities; a [`calibration::Problem`] preprocesses all of it once.
-//! Data flow in one direction: [`calibration`] solves, [`study`] evaluates by navigation and Monte Carlo, [`lot`] compares
-//! units of one type. [`earth`], [`attitude`], [`imu`], [`turntable`] and [`navigation`] do not depend on these;
-//! [`simulation`] generates runs from [`models`]; [`survey`] examines a run before calibration, [`noise`] its noise.
+//! [`calibration::Options`] select the estimated quantities; a [`calibration::Problem`] preprocesses the runs once.
+//! Data flow in one direction: [`calibration`] solves a problem, [`study`] evaluates the solution by navigation and
+//! Monte Carlo, and [`lot`] compares units of one type. [`earth`], [`attitude`], [`imu`], [`turntable`] and
+//! [`navigation`] do not depend on these; [`simulation`] generates runs from [`models`]; [`survey`] examines a run
+//! before calibration, and [`noise`] analyses its noise.
 //!
 //! # Crates
-//! This crate is the science: it reads no recording, prints nothing and draws nothing.
+//! This crate contains only the science: it reads no recordings, prints nothing and draws nothing.
 //!
 //! | crate | purpose | depends on |
 //! |---|---|---|

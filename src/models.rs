@@ -28,7 +28,7 @@ pub use trajectory::trajectory;
 /// Finds and reads a specification.
 ///
 /// # Errors
-/// If there is none of that name or it is malformed.
+/// Returns an error if there is no specification of this name, or it is malformed.
 pub fn specification(name_or_path: &Path) -> Result<Specification, ModelError> {
     let text = text(
         Room::Specification,

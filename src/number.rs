@@ -1,4 +1,4 @@
-//! Number formatting: digits up to the second significant digit of σ.
+//! Number formatting: values are printed up to the second significant digit of σ.
 
 use crate::units::{HOUR, MINUTE};
 
@@ -32,12 +32,12 @@ pub fn rounded(value: f64, digits: usize) -> f64 {
     text.parse().unwrap_or(value)
 }
 
-/// An accuracy, to two digits.
+/// An accuracy, rounded to two digits.
 pub fn sigma(sigma: f64) -> String {
     value(sigma, sigma)
 }
 
-/// A quantity to three digits.
+/// A quantity, rounded to three digits.
 pub fn three_digits(x: f64) -> String {
     if x.is_finite() && x.abs() >= 999.5 {
         let last = 10f64.powf(x.abs().log10().floor() - 2.0);
@@ -73,7 +73,7 @@ pub fn to_twelve_digits(x: f64) -> f64 {
     format!("{x:.11e}").parse().unwrap_or(x)
 }
 
-/// A number as stated, without rounding errors of a unit conversion.
+/// A number as the user stated it, without the rounding errors of a unit conversion.
 pub fn stated(x: f64) -> String {
     plain(to_twelve_digits(x))
 }
@@ -113,7 +113,7 @@ pub fn with_interval(of: f64, (low, high): (f64, f64)) -> [String; 2] {
     [value(of, 0.5 * (high - low)), interval((low, high))]
 }
 
-/// A value with its 1σ; to three digits if there is no σ.
+/// A value with its 1σ; if there is no σ, the value is rounded to three digits.
 pub fn plus_minus(of: f64, own: f64) -> String {
     if own <= 0.0 {
         return three_digits(of);
@@ -132,7 +132,8 @@ pub fn or_dash(of: Option<f64>, shown: impl FnOnce(f64) -> String) -> String {
     of.map_or_else(|| "–".to_owned(), shown)
 }
 
-/// The first unit, from the largest down, that does not exceed a size in SI; the last unit if all exceed it.
+/// The first unit, from the largest to the smallest, that does not exceed a size in SI units; the last unit if all
+/// exceed the size.
 pub fn readable(units: &[(&'static str, f64)], size: f64) -> (&'static str, f64) {
     let fits = units.iter().find(|(_, unit)| size >= *unit);
     fits.or(units.last()).copied().unwrap_or(("", 1.0))
@@ -164,7 +165,7 @@ pub fn tick(x: f64, step: f64) -> String {
     value(x, 10f64.powi(1 - places as i32))
 }
 
-/// A power of ten, written out if short.
+/// A power of ten, written out if it is short.
 pub fn power_of_ten(exponent: i32) -> String {
     if (-3..=4).contains(&exponent) {
         let step = 10f64.powi(exponent);

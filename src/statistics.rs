@@ -6,10 +6,10 @@ use statrs::function::beta::beta_reg;
 use statrs::function::gamma::ln_gamma;
 use statrs::statistics::{Data, OrderStatistics};
 
-/// False-alarm rate of a whole list of checks, divided among them.
+/// False-alarm rate of a whole list of checks, which is divided among the checks.
 pub const FALSE_ALARM: f64 = 1e-3;
 
-/// σ of a normal distribution, divided by the median of its absolute deviations.
+/// The σ of a normal distribution divided by the median of its absolute deviations.
 pub const SIGMA_OF_MEDIAN: f64 = 1.482_602;
 
 /// The limit that χ² with these degrees of freedom exceeds with probability `chance`; infinite for zero degrees of
@@ -78,7 +78,7 @@ pub fn student_limit(degrees: f64, chance: f64) -> f64 {
     }
 }
 
-/// The median of these numbers, which are reordered; `None` for an empty list.
+/// The median of these numbers; the list is reordered. `None` for an empty list.
 pub fn median(values: &mut [f64]) -> Option<f64> {
     (!values.is_empty()).then(|| Data::new(values).median())
 }

@@ -16,7 +16,7 @@ use crate::imu::{PerSensor, TermVector, Triad};
 pub struct Bound {
     /// The truth, with the bound as its covariance.
     pub estimate: Estimate,
-    /// Covariance of the parameters of error terms and table.
+    /// Covariance of the parameters of the error terms and of the table errors.
     pub auxiliary: Auxiliary,
     /// σ against time.
     pub history: Vec<Epoch>,
@@ -33,20 +33,21 @@ pub struct Bound {
 pub struct TermLeftOff {
     /// The term.
     pub term: ErrorTerm,
-    /// Remaining fraction of the prior σ, for the combination of its parameters with the largest fraction, if the term
-    /// were estimated with its usual σ: from 0 (known) to 1 (not observed).
+    /// If the term were estimated with its usual σ: the remaining fraction of its prior σ, from 0 (known) to 1 (not
+    /// observed). The value applies to the combination of parameters of the term for which the fraction is largest.
     pub remaining: f64,
-    /// 1σ of the change of each parameter if the term has its usual size.
+    /// 1σ of the change of each parameter caused by the term, if the term has its usual size.
     pub change: ParameterVector,
 }
 
-/// The covariance of a chain linearised at the truth, with the stated noise and error terms of the problem and the true
-/// `terms`, in the misalignment form of the truth: the inverse of the Bayesian information matrix for Gaussian noise
-/// (Van Trees, *Detection, Estimation, and Modulation Theory*, part I, §2.4.3). The initial attitude is that of the
-/// first reading or the coarse start: arc seconds of tilt and arc minutes of heading have no effect on the covariance.
+/// The covariance of a chain that is linearised at the truth, with the stated noise and error terms of the problem and
+/// the true `terms`, in the misalignment form of the truth. It is the inverse of the Bayesian information matrix for
+/// Gaussian noise (Van Trees, *Detection, Estimation, and Modulation Theory*, part I, §2.4.3). The initial attitude is
+/// taken from the first reading or the coarse start, because arc seconds of tilt and arc minutes of heading have no
+/// effect on the covariance.
 ///
 /// # Errors
-/// [`CalibrationError`] as for [`super::estimate`].
+/// Returns [`CalibrationError`] under the same conditions as [`super::estimate`].
 pub fn bound(
     problem: &Problem,
     truth: &PerSensor<Triad>,
@@ -59,7 +60,7 @@ pub fn bound(
 /// The bound, and the 1σ of the parameters without each move in turn.
 ///
 /// # Errors
-/// [`CalibrationError`] as for [`super::estimate`].
+/// Returns [`CalibrationError`] under the same conditions as [`super::estimate`].
 pub fn bound_without_moves(
     problem: &Problem,
     truth: &PerSensor<Triad>,
@@ -94,10 +95,10 @@ pub fn bound_without_moves(
     Ok((bound, filtered.without_moves(posterior)))
 }
 
-/// The constant error terms that a problem does not estimate, linearised at a truth as for [`bound`].
+/// The constant error terms that a problem does not estimate, linearised at a truth as in [`bound`].
 ///
 /// # Errors
-/// [`CalibrationError`] as for [`super::estimate`].
+/// Returns [`CalibrationError`] under the same conditions as [`super::estimate`].
 pub fn terms_left_off(
     problem: &Problem,
     truth: &PerSensor<Triad>,
@@ -129,7 +130,7 @@ pub fn terms_left_off(
 }
 
 /// The problem in the misalignment form of a truth, with stated noise.
-fn at_truth<'a>(problem: &Problem<'a>, truth: &PerSensor<Triad>) -> Problem<'a> {
+pub(super) fn at_truth<'a>(problem: &Problem<'a>, truth: &PerSensor<Triad>) -> Problem<'a> {
     problem.with(|model| *model = model.in_form(problem.run(), truth.gyro.form))
 }
 

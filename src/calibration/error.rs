@@ -11,13 +11,13 @@ use crate::run::motion::LabelCheck;
 /// and the remedy.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum CalibrationError {
-    /// Table aiding without a table.
+    /// Table observations were requested, but there is no table.
     #[error(
         "the run has no [turntable], which --aiding table requires. Add the table log to run.toml, or omit --aiding \
          table"
     )]
     NoTable,
-    /// A log with only one triad.
+    /// The log contains only one triad.
     #[error(
         "the log has no {0} columns, and {1}. Name the columns in run.toml, or analyse the noise of the other triad with \
          `turncal allan`",
@@ -28,7 +28,7 @@ pub enum CalibrationError {
         /// The missing triad.
         sensor: Sensor,
     },
-    /// Temperature-dependent parameters with a recording that has no temperature.
+    /// Parameters depend on temperature, but a recording has no temperature.
     #[error(
         "recording {number}, {recording}, has no usable temperature, which the temperature model needs. Name the \
          column in its run.toml (columns, `temperature`), state temperature_degc in [meta] or for this recording in \
@@ -47,7 +47,7 @@ pub enum CalibrationError {
          check the prior gyro bias and the noise figures"
     )]
     NoDwells,
-    /// A prior with a σ of zero, or a diverged estimate.
+    /// A prior σ is zero, or the estimate diverged.
     #[error(
         "the {} data contradict [imu.prior.{0}] (the fit diverged: K·C became singular). Check scale and units \
          there. Also check for dead, stuck or wrapped axes, lost rows, and a table log from a different run",
@@ -57,7 +57,7 @@ pub enum CalibrationError {
         /// The triad.
         sensor: Sensor,
     },
-    /// No usable labelled section.
+    /// The run has no usable labelled section.
     #[error(
         "none of the sections {} has a label for a position or turn, or each is partly missing. Use labels such as \
          `x_up`, `x_down` and `rot_x+360`, or remove [segments] so that turncal uses every dwell and \
@@ -76,10 +76,10 @@ pub enum CalibrationError {
         /// The contradicted sections.
         contradicted: Vec<LabelCheck>,
     },
-    /// Stopped by the progress callback.
+    /// The progress callback stopped the work.
     #[error("stopped before the iterations ended; nothing was written")]
     Stopped,
-    /// A statement in run.toml that the recording contradicts.
+    /// The recording contradicts a statement in run.toml.
     #[error("{}{contradiction}", .recording.iter().map(|name| format!("{name}: ")).collect::<String>())]
     Contradicted {
         /// The run, if there are several.
@@ -87,7 +87,7 @@ pub enum CalibrationError {
         /// The contradicted statement.
         contradiction: Box<Contradiction>,
     },
-    /// Samples that no error within the prior can explain, or unrealistic noise figures.
+    /// No error within the prior can explain the samples, or the noise figures are unrealistic.
     #[error(
         "the filter diverged at {time:.2} s because the samples do not fit run.toml. Check latitude, units, noise \
          figures (zero only for noise-free data), the prior σ, and the samples at that time"
@@ -106,7 +106,7 @@ fn quoted(labels: &[String]) -> String {
 /// Errors of a comparison of calibrations.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum ComparisonError {
-    /// Outputs of different quantities.
+    /// The outputs are different quantities.
     #[error(
         "{other} has the {} unit `{found}` and {name} has `{expected}`, so they cannot be compared. Give \
          calibrations in the same unit", .sensor.name()
@@ -114,16 +114,16 @@ pub enum ComparisonError {
     Unit {
         /// The triad.
         sensor: Sensor,
-        /// The first record that states a unit.
+        /// Name of the first calibration that states a unit.
         name: String,
         /// Unit.
         expected: String,
-        /// The record that states another unit.
+        /// Name of the calibration that states a different unit.
         other: String,
         /// The other unit.
         found: String,
     },
-    /// An axis far from the body axis of its name.
+    /// An axis is far from the body axis after which it is named.
     #[error(
         "{name}: the {} {axis} axis is 90° or more from body {axis} (by the sign of the scale factor in the \
          reference), or the matrix K·C is singular. Convert the calibrations to the same body axes and signs \

@@ -71,7 +71,7 @@ impl Estimate {
         to_vector(&self.triads)
     }
 
-    /// 1σ of each parameter; zero for those that were not estimated.
+    /// 1σ of each parameter; zero for parameters that were not estimated.
     pub fn sigma(&self) -> ParameterVector {
         self.covariance.diagonal().map(|v| v.max(0.0).sqrt())
     }
@@ -116,7 +116,7 @@ impl Estimate {
     }
 }
 
-/// Largest growth factor of σ, from variances before and after.
+/// Largest factor by which a σ grew, from the variances before and after.
 pub fn largest_growth(before: &[f64], after: &[f64]) -> f64 {
     let known = before
         .iter()

@@ -1,4 +1,4 @@
-//! The estimator, from top to bottom.
+//! The estimator, described from top to bottom.
 
 use crate::calibration::checks::prior_distance::widened;
 use crate::calibration::iterations::solve;
@@ -10,12 +10,12 @@ use crate::calibration::{
 
 /// Estimates both triads from zero velocity in dwells and, if observed, the attitude of the table.
 ///
-/// Each pass navigates once, linearised at the previous estimate, and solves the chain of its dwells with the most
-/// likely sizes of all effects: a Gauss–Newton step on all data. Source: after Maybeck, *Stochastic Models, Estimation
-/// and Control*, vol. 2, §9.7 (iterated, linearised filters).
+/// Each pass navigates once, linearised at the previous estimate, and then solves the chain of dwells with the most
+/// likely sizes of all effects. One pass is a Gauss–Newton step on all data. Source: after Maybeck, *Stochastic Models,
+/// Estimation and Control*, vol. 2, §9.7 (iterated, linearised filters).
 ///
 /// # Errors
-/// [`CalibrationError`] if the runs cannot give a calibration. Without convergence, the result is an
+/// Returns [`CalibrationError`] if the runs cannot give a calibration. Without convergence, the result is an
 /// [`Outcome`] with `converged = false` and a finding.
 pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, CalibrationError> {
     let start = with_magnetometer(problem, start(problem)?)?;

@@ -38,11 +38,11 @@ pub struct Solved {
     pub converged: bool,
 }
 
-/// Iterates from a starting point, with these priors of the initial attitudes.
+/// Iterates from a starting point, with the given priors of the initial attitudes.
 ///
 /// # Errors
-/// [`CalibrationError`] if no pass is possible at the start. If the iterations do not converge, the result is marked as
-/// not converged.
+/// Returns [`CalibrationError`] if the first pass fails at the starting point. If the iterations do not converge, the
+/// result is marked as not converged.
 pub fn solve(
     problem: &Problem,
     (start, priors): (&Linearisation, &[AttitudePrior]),

@@ -26,19 +26,18 @@ pub struct Linearisation {
     pub terms: TermVector,
     /// Temperature dependence; zero if there is none.
     pub thermal: PerSensor<ThermalCoefficients>,
-    /// Deviation in each recording from the common parameters; zero for recordings beyond the end of the
-    /// list.
+    /// Deviation of each recording from the common parameters; zero for recordings that are not in the list.
     pub own: Vec<Difference>,
     /// The magnetometer and its field; `None` if there is none, or if the dwells do not determine it.
     pub magnetic: Option<MagneticVector>,
     /// `C_b_n` at the first sample of each stretch.
     pub initial_attitudes: Vec<Matrix3<f64>>,
-    /// `C_b_n` at the beginning of each dwell, whatever the table reads; empty in the first pass.
+    /// `C_b_n` at the beginning of each dwell, regardless of the table reading; empty in the first pass.
     pub dwells: Vec<Matrix3<f64>>,
 }
 
 impl Linearisation {
-    /// A point without temperature dependence and without differences between recordings.
+    /// A linearisation point without temperature dependence and without differences between recordings.
     pub fn new(
         triads: PerSensor<Triad>,
         terms: TermVector,
@@ -141,10 +140,11 @@ pub fn singular(triads: &PerSensor<Triad>) -> CalibrationError {
 pub struct AttitudePrior {
     /// `C_b_n`: a table reading or, without a table, the coarse alignment.
     pub mean: Matrix3<f64>,
-    /// 1σ about East, North and Up, rad; the last is that of the heading.
+    /// 1σ about East, North and Up, rad; the last component is the σ of the heading.
     pub sigma: Vector3<f64>,
-    /// 1σ of Earth rate along East, North and Up of this attitude, rad/s. If the heading is unknown, the heading is
-    /// fixed and Earth rate has any horizontal direction; if the site is unknown, any direction. Otherwise, zero.
+    /// 1σ of Earth rate along the East, North and Up axes of this attitude, rad/s. If the heading is unknown, the
+    /// heading is fixed and Earth rate has any horizontal direction; if the site is unknown, any direction. Otherwise,
+    /// zero.
     pub earth_rate_sigma: Vector3<f64>,
 }
 

@@ -1,7 +1,7 @@
 //! Calibration: closed form, coarse start, chain of dwells with the sizes of all effects, and the checks of a result.
 //!
-//! A [`Problem`] takes runs and [`Options`]; [`estimate`] and [`six_position`] solve it; [`bound`] gives the Cramér–Rao
-//! bound. This module does not print, read files or draw.
+//! A [`Problem`] is made from runs and [`Options`]; [`estimate`] and [`six_position`] solve it; [`bound`] gives the
+//! Cramér–Rao bound. This module does not print, read files or draw.
 
 mod chain;
 mod checks;
@@ -17,6 +17,7 @@ mod error;
 mod estimate;
 mod estimator;
 mod iterations;
+mod leg;
 mod linearisation;
 mod magnetometer;
 pub mod model;
@@ -49,6 +50,7 @@ use constants::{Candidate, Constant, Known, Posterior, Prior, of_parameters};
 pub use error::{CalibrationError, ComparisonError};
 pub use estimate::{Epoch, Estimate};
 pub use estimator::estimate;
+pub use leg::{Journey, Leg};
 pub use linearisation::{AttitudePrior, Linearisation};
 pub use magnetometer::{MagneticEstimate, MagneticPrior, ellipsoid};
 pub use model::Model;

@@ -1,4 +1,4 @@
-//! Estimated quantities of a run with their prior; cheap to copy and modify.
+//! The quantities to estimate from a run, with their prior; a model is cheap to copy and modify.
 
 use std::sync::Arc;
 
@@ -44,17 +44,17 @@ pub struct Model {
     pub noise: PerSensor<Noise>,
     /// Noise added during moves.
     pub motion_noise: PerSensor<MotionNoise>,
-    /// White 1σ, at standstill, of the integral of each triad's output: attitude in rad, velocity in m/s; `None`: in
-    /// each stretch, the value stated in or estimated from its run.
+    /// 1σ, at standstill (white), of the integral of each triad's output: attitude in rad, velocity in m/s. With
+    /// `None`, each stretch uses the value that is stated in its run or estimated from it.
     pub standstill_sigma: PerSensor<Option<f64>>,
     /// Unwanted rotation of the body in dwells without a table: 1σ density of a random walk, rad/√s. The gyros sense
     /// this rotation, so it is not part of their noise.
     pub turning_at_rest: f64,
-    /// 1σ of each error-term parameter, with mean zero; 0 if a term is off.
+    /// 1σ of each parameter of an error term, whose prior mean is zero; 0 if the term is off.
     pub term_sigma: TermVector,
     /// Error terms that may be absent; the estimate averages over their sizes.
     pub may_have: Vec<ErrorTerm>,
-    /// Whether the latitude may differ from the stated one (only a table shows this).
+    /// Whether the latitude may differ from the stated latitude, which only a table can show.
     pub may_be_elsewhere: bool,
     /// Temperature dependence of the instrument, if any.
     pub thermal: Option<Arc<ThermalModel>>,
@@ -72,7 +72,7 @@ pub struct Model {
     pub settling_sigma: f64,
     /// Time in which the settling fades, s.
     pub settling_time: f64,
-    /// 1σ of table errors not included in its readings; zero if off.
+    /// 1σ of the table errors that the readings do not contain; zero if off.
     pub geometry: TableGeometry,
     /// Number of table axes with angle readings; zero if there are none.
     pub(in crate::calibration) table_axes: usize,
@@ -81,7 +81,7 @@ pub struct Model {
 }
 
 impl Model {
-    /// The model of a run: the run's statements, completed by the options.
+    /// The model of a run, from the statements of the run and the options.
     pub fn new(run: &Run, options: &Options) -> Self {
         let aiding = options.aiding.unwrap_or_else(|| run.aiding());
         let table = run.observed_table(aiding);
@@ -215,8 +215,8 @@ impl Model {
         }
     }
 
-    /// Switches an error term on, with its usual σ unless the run states one. No effect if the
-    /// run does not support it.
+    /// Switches an error term on; its σ is the usual one, unless the run states another σ. This has no effect if the
+    /// run does not support the term.
     pub fn switch_on(&mut self, term: ErrorTerm) {
         self.may_have.retain(|&of| of != term);
         if !self.has(term) && self.can_have(term) {
@@ -265,7 +265,7 @@ pub fn usual_axis_error(kind: AxisError, position_sigma: f64) -> f64 {
     }
 }
 
-/// Default variation of a bias, from its white noise.
+/// Default variation of a bias, derived from the white noise.
 pub fn usual_variation(noise: &Noise) -> GaussMarkov {
     GaussMarkov {
         sigma: USUAL_VARIATION * noise.random_walk / USUAL_CORRELATION.sqrt(),

@@ -1,10 +1,10 @@
-//! Options of the estimation.
+//! Options for the estimation.
 
 use crate::calibration::{ErrorTerm, NoisePolicy};
 use crate::imu::InstallationForm;
 use crate::run::Aiding;
 
-/// Options of the estimation; the default suits most runs.
+/// Options for the estimation; the defaults suit most runs.
 ///
 /// ```
 /// use turncal::calibration::Options;
@@ -20,7 +20,7 @@ use crate::run::Aiding;
 pub struct Options {
     /// Form of the misalignment matrix.
     pub form: InstallationForm,
-    /// Observations at rest; `None`: table attitude if there is a table log, otherwise zero velocity.
+    /// Observations at rest. `None` means table attitude if there is a table log, otherwise zero velocity.
     pub aiding: Option<Aiding>,
     /// Error terms to estimate in addition to those with a σ stated for instrument or table.
     pub terms: Vec<ErrorTerm>,
@@ -28,7 +28,7 @@ pub struct Options {
     pub auto_terms: bool,
     /// Noise policy.
     pub noise: NoisePolicy,
-    /// Convergence limit: largest step of any parameter, in σ.
+    /// Convergence limit: the iterations end when no parameter changes by more than this limit, in σ.
     pub converged_sigma: f64,
     /// Maximum number of passes over the recording.
     pub passes: usize,
@@ -67,7 +67,7 @@ impl Options {
         Self { noise, ..self }
     }
 
-    /// Restricts error terms to those requested.
+    /// Restricts the error terms to those that are requested.
     pub fn no_auto_terms(self) -> Self {
         Self {
             auto_terms: false,
@@ -75,7 +75,8 @@ impl Options {
         }
     }
 
-    /// Adds this error term, whatever the data indicate, with a wide σ unless instrument or table state another.
+    /// Adds this error term, which is then estimated regardless of the data; its σ is wide unless the instrument or the
+    /// table states another σ.
     pub fn with(mut self, term: ErrorTerm) -> Self {
         self.terms.push(term);
         self

@@ -39,20 +39,20 @@ pub struct Outcome {
     pub prior_sigma: ParameterVector,
     /// Prior of the initial attitude of each stretch.
     pub prior_attitudes: Vec<AttitudePrior>,
-    /// Posterior 1σ of the initial attitude of the last stretch about East, North and Up, rad; the last is that of the
-    /// heading.
+    /// Posterior 1σ of the initial attitude of the last stretch about East, North and Up, rad; the last component is
+    /// the σ of the heading.
     pub attitude_sigma: Vector3<f64>,
-    /// Errors of the table's geometry and parameters of the instrument's error terms, if certain or requested.
+    /// Errors of the table geometry and parameters of the instrument's error terms, if they are certain or requested.
     pub auxiliary: Auxiliary,
     /// Temperature dependence of the parameters, if any.
     pub thermal: Option<Thermal>,
-    /// Deviation of each recording from the common parameters; empty if there is none.
+    /// Deviation of each recording from the common parameters; empty if the parameters do not differ.
     pub own: Vec<Own>,
     /// Separate calibration of each recording, if recordings or temperatures differ.
     pub alone: Vec<SeparateEstimate>,
     /// The magnetometer and its field, if there is one and the dwells determine it.
     pub magnetic: Option<MagneticEstimate>,
-    /// Gravity and its 1σ after the run, m/s².
+    /// Gravity and its 1σ after the fit, m/s².
     pub gravity: (f64, f64),
     /// Observability of the parameters in the run.
     pub observability: Observability,
@@ -60,11 +60,11 @@ pub struct Outcome {
     pub linearised_at: Linearisation,
     /// All passes in order.
     pub passes: Vec<Pass>,
-    /// Whether the last pass moved no parameter by more than the limit.
+    /// Whether the last pass changed no parameter by more than the limit.
     pub converged: bool,
     /// Estimate and σ against time in the last pass.
     pub history: Vec<Epoch>,
-    /// White 1σ of the velocity at standstill that the filter used in the first stretch, m/s.
+    /// 1σ of the velocity at standstill (white) that the filter used in the first stretch, m/s.
     pub velocity_sigma: f64,
     /// Innovations of the last pass.
     pub innovations: Vec<Innovation>,
@@ -76,7 +76,7 @@ pub struct Outcome {
     pub model: Model,
     /// Origin of the noise that was used.
     pub noise: NoiseReport,
-    /// Single events that stand out.
+    /// Single unusual events.
     pub events: Vec<Event>,
     /// Evidence for every error term that may be present.
     pub terms: Vec<TermEvidence>,
@@ -93,7 +93,7 @@ pub struct Outcome {
 pub struct Own {
     /// The estimate.
     pub values: Difference,
-    /// 1σ; zero for parameters common to all.
+    /// 1σ of each deviation; zero for parameters common to all recordings.
     pub sigma: Difference,
 }
 
@@ -163,8 +163,8 @@ impl Outcome {
         Verdict::of(&self.findings).word != Word::Failed
     }
 
-    /// Whether the run observed the heading: without the prior, opposite headings differ by more than 6
-    /// in χ².
+    /// Whether the run observed the heading, that is, whether opposite headings differ by more than 6 in χ² without the
+    /// prior.
     pub fn heading_observed(&self) -> bool {
         let information = |sigma: &Vector3<f64>| sigma.z.powi(-2);
         let Some(prior) = self.prior_attitudes.last() else {
@@ -200,7 +200,7 @@ fn with_all_parts(problem: &Problem, solved: &Solved) -> Estimate {
     estimate
 }
 
-/// Parts of the covariance that are not from the chain: rounding and sample period.
+/// Contributions to the covariance that do not come from the chain: rounding and sample period.
 pub fn beside(problem: &Problem, estimate: &Estimate) -> [ParameterMatrix; 2] {
     [
         by_rounding(problem, &estimate.triads),

@@ -7,7 +7,7 @@ use crate::calibration::CalibrationError;
 /// One pass over the recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pass {
-    /// The largest step of any parameter from the linearisation point, in σ.
+    /// The largest change of any parameter from the linearisation point, in σ.
     pub largest_step: f64,
     /// Sum of squared whitened innovations, plus the prior term.
     pub cost: f64,
@@ -15,7 +15,7 @@ pub struct Pass {
     pub observations: usize,
 }
 
-/// Callback after each pass. It may stop the work; the command line uses it to display the progress.
+/// Callback after each pass. The callback may stop the work. The command line uses it to display the progress.
 pub type Progress<'a> = &'a (dyn Fn(&Pass) -> ControlFlow<()> + Sync);
 
 /// A callback that does nothing.
@@ -24,7 +24,7 @@ pub const UNWATCHED: Progress<'static> = &|_| ControlFlow::Continue(());
 /// Reports a pass.
 ///
 /// # Errors
-/// [`CalibrationError::Stopped`] if the callback stops the work.
+/// Returns [`CalibrationError::Stopped`] if the callback stops the work.
 pub fn tell(progress: Progress, pass: &Pass) -> Result<(), CalibrationError> {
     match progress(pass) {
         ControlFlow::Continue(()) => Ok(()),

@@ -21,8 +21,8 @@ const INITIAL_VELOCITY: f64 = 1e-3;
 
 /// Runs of one instrument with the model to estimate.
 ///
-/// Dwells, moves and the schedule of observations are found once; estimate, tests, bound and quality share
-/// them. Copies with another [`Model`] are cheap.
+/// Dwells, moves and the schedule of observations are determined once, and are shared by estimate, tests, bound and
+/// quality. A copy with another [`Model`] is cheap.
 #[derive(Debug, Clone)]
 pub struct Problem<'a> {
     /// The estimated quantities with their prior.
@@ -35,13 +35,13 @@ pub struct Problem<'a> {
     left_out: Vec<String>,
 }
 
-/// Continuous part of a recording, from its first dwell to its last.
+/// Continuous part of a recording, from its first dwell to its last dwell.
 #[derive(Debug, Clone)]
 pub struct Stretch<'a> {
     pub run: &'a Run,
     /// The table's readings, if they are observed.
     pub table: Option<&'a TableLog>,
-    /// Index of its run in the problem.
+    /// Index, in the problem, of the run to which the stretch belongs.
     pub recording: usize,
     pub dwells: Vec<Dwell>,
     pub steps: Vec<Step>,
@@ -65,8 +65,8 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// A copy with an additional run of the instrument. The priors of the instrument and of the table remain those of
-    /// the first run; each site has its own gravity.
+    /// A copy of the problem with an additional run of the instrument. The priors of the instrument and of the table
+    /// remain those of the first run; each site has its own gravity.
     pub fn and(&self, run: &'a Run) -> Self {
         let mut all = self.stretches.to_vec();
         all.extend(stretches(run, self.others.len() + 1, &self.model));
@@ -187,7 +187,7 @@ impl<'a> Problem<'a> {
         sum / self.stretches.len().max(1) as f64
     }
 
-    /// The run; the first of several.
+    /// The run of the problem, or the first of several runs.
     pub fn run(&self) -> &'a Run {
         self.run
     }
@@ -294,8 +294,8 @@ impl<'a> Stretch<'a> {
         }
     }
 
-    /// Variance of an observation per axis, rad² or m²/s², including pulses; for a table attitude, that of the mean of
-    /// this many readings.
+    /// Variance of an observation per axis, rad² or m²/s², including pulses; for a table attitude, the variance of the
+    /// mean of this many readings.
     pub fn observation_variance(&self, model: &Model, kind: Observation, readings: usize) -> f64 {
         let sensor = kind.sensor();
         let own = match kind {
@@ -350,7 +350,7 @@ impl<'a> Stretch<'a> {
         INITIAL_VELOCITY.hypot(self.standstill_sigma.accel)
     }
 
-    /// Uncertainty at the first sample, for errors relative to a point with attitude `at`.
+    /// Uncertainty at the first sample, for errors relative to a linearisation point with the attitude `at`.
     pub fn start(&self, prior: &AttitudePrior, at: &Matrix3<f64>) -> Start {
         Start {
             attitude: to_tilt_and_heading(&(prior.mean * at.transpose())),

@@ -1,4 +1,4 @@
-//! Solution of a problem by either method, with its assessment.
+//! The solution of a problem by either method, and its assessment.
 
 use crate::calibration::result::Provenance;
 use crate::calibration::start::closed_form::six_position_by;
@@ -9,7 +9,7 @@ use crate::calibration::{
 use crate::imu::{PerSensor, Sensor};
 use crate::units::DEGREE;
 
-/// Result of a method for a problem.
+/// Result of one method for a problem.
 #[derive(Debug, Clone)]
 pub enum Solution {
     /// The filter.
@@ -31,7 +31,7 @@ impl Problem<'_> {
     /// Solves the problem with a method; fails if the recording contradicts run.toml.
     ///
     /// # Errors
-    /// [`CalibrationError`] if the runs cannot give a calibration by this method.
+    /// Returns [`CalibrationError`] if the runs cannot give a calibration by this method.
     pub fn solve(&self, method: Method, progress: Progress) -> Result<Solution, CalibrationError> {
         let is_missing = |&sensor: &Sensor| {
             self.lacks(sensor) && (sensor == Sensor::Accel || !self.shows_gravity_alone())
@@ -55,7 +55,7 @@ impl Problem<'_> {
         })
     }
 
-    /// Origin of a calibration of the problem, without the files.
+    /// Origin of a calibration of the problem, without the list of files.
     pub fn provenance(&self) -> Provenance {
         let run = self.run();
         let imu = &run.recording.imu;
@@ -102,7 +102,7 @@ impl Solution {
         self.outcome().is_none_or(|outcome| outcome.converged)
     }
 
-    /// Whether the solution may be used: the filter converged, and noise explains the residuals.
+    /// Whether the solution may be used, that is, whether the filter converged and noise explains the residuals.
     pub fn is_usable(&self) -> bool {
         match self {
             Self::Filter(outcome) => outcome.is_usable(),
@@ -113,7 +113,7 @@ impl Solution {
     /// Evaluates the residuals of gravity and turns, and the uncertainty budget.
     ///
     /// # Errors
-    /// [`CalibrationError`] if the problem is not the one of the solution.
+    /// Returns [`CalibrationError`] if the solution belongs to a different problem.
     pub fn assess(&self, problem: &Problem) -> Result<Assessment, CalibrationError> {
         match self {
             Self::Filter(outcome) => {
@@ -142,7 +142,7 @@ impl Solution {
         }
     }
 
-    /// The calibration, in the quantity of the file.
+    /// The calibration, in the file's quantity.
     pub fn calibration(&self, problem: &Problem, assessment: &Assessment) -> Calibration {
         match self {
             Self::Filter(outcome) => {

@@ -1,4 +1,4 @@
-//! The 48 orders and signs of three axes.
+//! The 48 signed permutations of three axes.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -57,7 +57,7 @@ impl AxisOrder {
         Vector3::from_fn(|axis, _| self.sign(axis) * v[self.source[axis]])
     }
 
-    /// Rearranges one value per axis, such as a σ or a nominal scale. The value is independent of sign, because a
+    /// Rearranges one value per axis, such as a σ or a nominal scale. The sign of the value does not change, because a
     /// reversed axis changes the sign of both input and output.
     pub fn each(&self, v: Vector3<f64>) -> Vector3<f64> {
         Vector3::from(self.source.map(|axis| v[axis]))
@@ -74,7 +74,7 @@ impl AxisOrder {
         })
     }
 
-    /// The composition: first `first`, then this order.
+    /// The composition of two orders: first `first`, then this order.
     pub fn after(&self, first: &Self) -> Self {
         Self {
             source: self.source.map(|axis| first.source[axis]),
@@ -101,7 +101,7 @@ impl AxisOrder {
         }
     }
 
-    /// Whether the permutation is a rotation: right-handed axes stay right-handed.
+    /// Whether the permutation is a rotation, so that right-handed axes stay right-handed.
     pub fn is_rotation(&self) -> bool {
         self.matrix().determinant() > 0.0
     }

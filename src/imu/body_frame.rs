@@ -14,7 +14,8 @@ pub enum BodyFrame {
 }
 
 impl BodyFrame {
-    /// The frame to which all these calibrations can be converted: the accelerometer frame if any of them is in it.
+    /// The frame to which all given calibrations can be converted: the accelerometer frame if any calibration is in
+    /// this frame.
     pub fn common(mut all: impl Iterator<Item = Self>) -> Self {
         if all.any(|frame| frame == Self::Accelerometer) {
             Self::Accelerometer

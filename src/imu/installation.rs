@@ -3,17 +3,17 @@
 use nalgebra::{Matrix3, SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
-/// Largest number of misalignment angles of any form; a form with fewer leaves the last ones zero.
+/// Largest number of misalignment angles in any form; in a form with fewer angles, the last ones are zero.
 pub const ANGLES: usize = 6;
 
 /// Definition of the misalignment matrix by six or three small angles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum InstallationForm {
-    /// Six direction cosines, rows of unit norm: `C_ii = √(1 − C_ij² − C_ik²)` (Eqs. 4 and 7)
+    /// Six direction cosines and rows of unit norm: `C_ii = √(1 − C_ij² − C_ik²)` (Eqs. 4 and 7)
     #[default]
     General,
-    /// Six off-diagonal entries, unit diagonal (Eq. 8)
+    /// Six off-diagonal entries and a unit diagonal (Eq. 8)
     SixAngle,
     /// Identity plus a cross-product matrix of three angles `E_yz`, `E_xz`, `E_xy` (Eq. 10)
     ThreeAngle,
@@ -95,9 +95,9 @@ impl InstallationForm {
 
     /// Splits a sensitivity matrix `A = K C` into scale factors and misalignment angles.
     ///
-    /// General and six-angle reproduce `A` exactly. Three-angle takes `K_i = A_ii` and half the
-    /// difference of the two entries of a pair; its error is half their sum. In every form, the sign of a
-    /// scale factor is that of its diagonal entry: an axis that senses opposite to its body axis has a
+    /// The general and six-angle forms reproduce `A` exactly. The three-angle form takes `K_i = A_ii` and half the
+    /// difference of the two entries of each pair; its error is half the sum of the two entries. In every form, the
+    /// sign of a scale factor is that of its diagonal entry: an axis that senses opposite to its body axis has a
     /// negative scale factor.
     pub fn split(self, a: &Matrix3<f64>) -> (SVector<f64, 3>, SVector<f64, ANGLES>) {
         let scale = match self {

@@ -6,7 +6,7 @@ use super::{
     Triad, TriadVector,
 };
 
-/// An instrument as described by data sheet and experience.
+/// An instrument, described by the knowledge from its data sheet and from experience.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Instrument {
     /// Nominal scale of each triad: the file's quantity per second for one rad/s or m/s².
@@ -17,11 +17,11 @@ pub struct Instrument {
     pub prior: PerSensor<Prior>,
     /// Noise of each triad.
     pub noise: PerSensor<Noise>,
-    /// Whether white noise is stated; otherwise it is estimated from the quieter part of the recording.
+    /// Whether the white noise is stated; if not, it is estimated from the quieter part of the recording.
     pub noise_is_stated: PerSensor<bool>,
     /// Noise added during moves.
     pub motion_noise: PerSensor<MotionNoise>,
-    /// Prior 1σ of each error-term parameter, with mean zero; 0 if a term is off.
+    /// Prior 1σ of each parameter of an error term, whose prior mean is zero; 0 if the term is off.
     pub term_sigma: TermVector,
     /// Error terms that are stated to be absent.
     pub absent_terms: Vec<Term>,
@@ -52,10 +52,10 @@ impl Instrument {
 
     /// 1σ of each parameter before calibration; zero if the form lacks the parameter or the body frame fixes it.
     ///
-    /// [`Prior`] refers to the mounting face. The accelerometer frame is rotated from it by the accelerometers'
-    /// angles above the diagonal. Each of these angles is added to the one across the diagonal and to the gyros'
-    /// angles of the same pair of axes, so variances add (first order in the angles; the correlation of these sums
-    /// is neglected).
+    /// [`Prior`] refers to the mounting face. The accelerometer frame is rotated relative to the mounting face by the
+    /// accelerometers' angles above the diagonal. Each of these angles is added to the angle across the diagonal and to
+    /// the gyros' angles for the same pair of axes, so the variances add up (first order in the angles; the correlation
+    /// of these sums is neglected).
     pub fn prior_sigma(
         &self,
         form: InstallationForm,

@@ -1,4 +1,4 @@
-//! The instrument: output of a triad of gyros or accelerometers as a function of its input.
+//! The model of the instrument: the output of a triad of gyros or accelerometers as a function of its input.
 //!
 //! `N = K C u + D` (Zhao, Jiang, Li 2016, Eq. 6; in the second line of the printed Eq. 6, `N_g` means the
 //! accelerometer). `u` is the angular rate in rad/s or the specific force in m/s² along the body axes, `K` diagonal,
@@ -10,6 +10,7 @@ mod body_frame;
 mod installation;
 mod instrument;
 mod noise_keys;
+mod rounding;
 mod signal;
 mod terms;
 mod thermal;
@@ -20,6 +21,7 @@ pub use body_frame::BodyFrame;
 pub use installation::{ANGLES, InstallationForm};
 pub use instrument::Instrument;
 pub use noise_keys::NoiseKeys;
+pub use rounding::rounding_error;
 pub use signal::{GaussMarkov, MotionNoise, Noise, NoiseSource, Output, Pulses};
 pub use terms::{
     REFERENCE_RATE, Sensed, TERM_PARAMETERS, Term, TermEntry, TermResponse, TermVector,

@@ -1,11 +1,11 @@
-//! From an ideal output to the samples of an instrument: noise, Gauss–Markov bias, pulses.
+//! Conversion of an ideal output to the samples of an instrument, with noise, Gauss–Markov bias and pulses.
 
 use nalgebra::Vector3;
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
-/// Quantity of one sample.
+/// Quantity in one sample.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema,
 )]
@@ -39,12 +39,13 @@ pub struct GaussMarkov {
 }
 
 /// White noise of a triad during moves, in addition to its noise at rest: 1σ densities of the integrated angle or
-/// velocity. Simulations do not generate it.
+/// velocity. Simulations do not generate this noise.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct MotionNoise {
-    /// Part that grows with the speed of a move, √s: 1σ divided by the root of ∫|ω − ω_ie|² dt or ∫|f + g|² dt.
+    /// Part of the noise that grows with the speed of a move, √s: 1σ divided by the square root of ∫|ω − ω_ie|² dt or
+    /// ∫|f + g|² dt.
     pub by_motion: f64,
-    /// Part that grows with the duration of a move, rad/√s or (m/s)/√s.
+    /// Part of the noise that grows with the duration of a move, rad/√s or (m/s)/√s.
     pub by_duration: f64,
 }
 
@@ -68,8 +69,8 @@ impl Noise {
     /// Covariance, on one axis, of the mean outputs over two time spans (start and end, s): (rad/s)² or (m/s²)². For
     /// two equal spans, the covariance is the variance of the mean.
     ///
-    /// Random walk is common to both where they overlap; the Gauss–Markov bias is the double integral of
-    /// its autocovariance `σ² exp(−|t|/τ)` over both.
+    /// The random walk contributes where the two spans overlap. The contribution of the Gauss–Markov bias is the double
+    /// integral of its autocovariance `σ² exp(−|t|/τ)` over both spans.
     pub fn covariance_of_means(&self, one: [f64; 2], other: [f64; 2]) -> f64 {
         let product = (one[1] - one[0]) * (other[1] - other[0]);
         let overlap = (one[1].min(other[1]) - one[0].max(other[0])).max(0.0);
@@ -101,7 +102,7 @@ impl Noise {
     }
 }
 
-/// Draws a triad's noise, sample by sample.
+/// Generates the noise of a triad sample by sample.
 #[derive(Debug, Clone)]
 pub struct NoiseSource {
     noise: Noise,
@@ -138,8 +139,8 @@ impl NoiseSource {
     }
 }
 
-/// A pulse counter: the remainder of each sample is carried into the next, so the sum of all
-/// pulses stays within half a count of the integral.
+/// A pulse counter: the remainder of each sample is carried into the next one, so the sum of all pulses differs from
+/// the integral by at most half a count.
 #[derive(Debug, Clone, Default)]
 pub struct Pulses {
     carry: Vector3<f64>,

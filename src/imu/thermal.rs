@@ -1,10 +1,10 @@
-//! Temperature dependence of a triad: each parameter is a polynomial in temperature; biases may also depend on
-//! its rate.
+//! Temperature dependence of a triad. Each parameter is a polynomial in temperature; biases may also depend on the
+//! temperature rate.
 //!
-//! `θ(T) = θ + Σ_k c_k B_k`, with `B_k = P_k(τ(T)) − P_k(τ(T_ref))` for the orders k from one on, P Legendre,
-//! τ the temperature scaled to [−1, 1] over the recorded range, and a last B equal to dT/dt over its largest recorded
-//! magnitude. Thus θ is the parameter at a constant reference temperature, and each c has the magnitude of its effect
-//! within the range.
+//! `θ(T) = θ + Σ_k c_k B_k`, with `B_k = P_k(τ(T)) − P_k(τ(T_ref))` for the orders k from one on, P Legendre, τ the
+//! temperature scaled to [−1, 1] over the recorded range, and a last B equal to dT/dt over its largest recorded
+//! magnitude. Thus θ is the parameter at a constant reference temperature, and each c is as large as its effect within
+//! the range.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -17,11 +17,11 @@ pub const THERMAL_FUNCTIONS: usize = HIGHEST_ORDER + 1;
 /// Index of the rate among the functions.
 pub const RATE: usize = HIGHEST_ORDER;
 
-/// Values of all functions at a time.
+/// Values of all functions at one time.
 pub type ThermalValues = SVector<f64, THERMAL_FUNCTIONS>;
 /// Coefficients of one triad: a row for each parameter, a column for each function.
 pub type ThermalCoefficients = SMatrix<f64, PARAMETERS, THERMAL_FUNCTIONS>;
-/// Values of all functions at a time, of the axes x, y and z of both triads.
+/// Values of all functions at one time, for the axes x, y and z of both triads.
 pub type ThermalState = PerSensor<[ThermalValues; 3]>;
 
 /// The temperature range in which the polynomials of a triad are valid.
@@ -36,7 +36,7 @@ pub struct ThermalRange {
     /// Reference temperature of the parameters, °C.
     #[serde(rename = "reference_degc")]
     pub reference: f64,
-    /// The largest magnitude of its rate, K/s.
+    /// The largest magnitude of the temperature rate, K/s.
     #[serde(rename = "largest_rate_k_per_s")]
     pub largest_rate: f64,
 }
@@ -72,7 +72,7 @@ impl ThermalRange {
     }
 }
 
-/// Both triads' functions at temperatures in °C that change by these rates in K/s.
+/// The functions of both triads at temperatures in °C that change at these rates in K/s.
 pub fn thermal_state(
     ranges: &PerSensor<ThermalRange>,
     temperatures: &PerSensor<[f64; 3]>,
@@ -84,7 +84,7 @@ pub fn thermal_state(
     })
 }
 
-/// Both triads' functions at one temperature in °C of all axes and its rate in K/s.
+/// The functions of both triads if all axes have the same temperature in °C and temperature rate in K/s.
 pub fn thermal_state_everywhere(
     ranges: &PerSensor<ThermalRange>,
     temperature: f64,
@@ -123,7 +123,7 @@ impl Triad {
 pub struct ThermalModel {
     /// Temperature range of each triad's polynomials.
     pub range: PerSensor<ThermalRange>,
-    /// Prior 1σ of every coefficient, with mean zero; 0 if it is off.
+    /// Prior 1σ of every coefficient, whose prior mean is zero; 0 if the coefficient is off.
     pub sigma: PerSensor<ThermalCoefficients>,
 }
 

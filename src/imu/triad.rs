@@ -1,4 +1,4 @@
-//! One triad: scale factors, misalignments, biases, and their prior.
+//! One triad: scale factors, misalignments and biases, and their prior.
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
@@ -21,7 +21,7 @@ pub struct Triad {
     pub form: InstallationForm,
     /// Diagonal of `K`, relative to the nominal scale.
     pub scale: Vector3<f64>,
-    /// Misalignment angles, pure numbers; those that the form does not have are zero.
+    /// Misalignment angles, pure numbers; angles that the form does not have are zero.
     pub angles: SVector<f64, ANGLES>,
     /// `D` in rad/s or m/s².
     pub bias: Vector3<f64>,
@@ -38,7 +38,7 @@ impl Triad {
         }
     }
 
-    /// The triad of this form with sensitivity nearest to `a = K C` and this bias.
+    /// The triad of this form whose sensitivity is nearest to `a = K C`, with this bias.
     pub fn from_sensitivity(form: InstallationForm, a: &Matrix3<f64>, bias: Vector3<f64>) -> Self {
         let (scale, angles) = form.split(a);
         Self {
@@ -74,8 +74,8 @@ impl Triad {
         self.sensitivity() * u + self.bias
     }
 
-    /// `∂N/∂θ_p = W_p [u; 1]` for every parameter: `N` is linear in the input and 1, so a 3×4 matrix
-    /// holds the derivative for any input. Parameters that the form does not have get zeros.
+    /// `∂N/∂θ_p = W_p [u; 1]` for every parameter: `N` is linear in `[u; 1]`, so one 3×4 matrix contains the derivative
+    /// for any input. The derivatives are zero for parameters that the form does not have.
     pub fn response(&self) -> [SMatrix<f64, 3, 4>; PARAMETERS] {
         let c = self.installation();
         let scale = Matrix3::from_diagonal(&self.scale);
@@ -208,7 +208,7 @@ impl Prior {
         }
     }
 
-    /// 1σ of each parameter; zero for those that the form does not have.
+    /// 1σ of each parameter; zero for parameters that the form does not have.
     pub fn sigma(&self, form: InstallationForm) -> TriadVector {
         TriadVector::from_fn(|parameter, _| {
             let of_axes = match Triad::kind(parameter) {
@@ -227,13 +227,13 @@ impl Prior {
 pub struct Nominal(pub Vector3<f64>);
 
 impl Nominal {
-    /// `K C` of a normalised triad in the file's quantity.
+    /// `K C` of a normalised triad, in the file's quantity per second.
     pub fn sensitivity(&self, triad: &Triad) -> Matrix3<f64> {
         Matrix3::from_diagonal(&self.0) * triad.sensitivity()
     }
 
-    /// The factor from the normalised parameter to the file's: the nominal scale for scale factors
-    /// and biases, one for angles.
+    /// The factor that converts a normalised parameter to the file's quantity: the nominal scale for scale factors and
+    /// biases, one for angles.
     pub fn factor(&self, parameter: usize) -> f64 {
         match Triad::kind(parameter) {
             ParameterKind::Scale => self.0[parameter - SCALE],

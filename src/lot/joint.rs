@@ -1,4 +1,4 @@
-//! Scatter of all parameters with their correlations.
+//! Scatter of all parameters, including their correlations.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -6,8 +6,8 @@ use super::scatter::ChiSquare;
 use crate::calibration::result::nees::Directions;
 
 /// χ² of vectors about their weighted mean, with the covariance of each: the sum over all vectors of the squared
-/// distance from the mean of the preceding vectors, normalised by the sum of both covariances. Directions without σ are
-/// left out. `None` for fewer than two vectors, or if a matrix is not a covariance.
+/// distance from the mean of the preceding vectors, normalised by the sum of both covariances. Directions that have no
+/// σ are left out. `None` for fewer than two vectors, or if a matrix is not a covariance.
 pub fn joint(all: impl IntoIterator<Item = (DVector<f64>, DMatrix<f64>)>) -> Option<ChiSquare> {
     let mut all = all.into_iter();
     let (mut mean, mut of_mean) = all.next()?;

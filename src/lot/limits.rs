@@ -1,8 +1,9 @@
 //! Limits, and the check of units against them.
 //!
 //! A value x with σ is within [low, high] with probability `Φ((high − x)/σ) − Φ((low − x)/σ)`. The value passes if this
-//! probability is at least the stated confidence, and fails if the probability of being outside is. In between, the
-//! limit is not decided: a guard band on both sides of each limit (JCGM 106:2012, 7.2 and 8.3).
+//! probability is at least the stated confidence, and fails if the probability of being outside is at least the stated
+//! confidence. In between, the limit is not decided: a guard band on both sides of each limit (JCGM 106:2012, 7.2 and
+//! 8.3).
 
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, Normal};
@@ -31,21 +32,21 @@ impl Specification {
 pub struct Limit {
     /// Index of the parameter in the general form.
     pub parameter: usize,
-    /// Centre of the range, normalised, in SI.
+    /// Centre of the range, normalised, in SI units.
     pub nominal: f64,
     /// Largest allowed distance from the centre.
     pub within: f64,
 }
 
-/// Result of a check against one limit, or against all.
+/// Result of a check against one limit or against all limits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
-    /// Within the limit, with the stated confidence.
+    /// The value is within the limit, with the stated confidence.
     Pass,
-    /// Neither within nor outside the limit with the stated confidence.
+    /// The value is neither within nor outside the limit with the stated confidence.
     NotDecided,
-    /// Outside the limit, with the stated confidence.
+    /// The value is outside the limit, with the stated confidence.
     Fail,
 }
 
@@ -56,7 +57,7 @@ pub struct Check {
     pub limit: Limit,
     /// Distance from the nominal value with its 1σ; `None` if the unit does not have the parameter.
     pub off: Option<(f64, f64)>,
-    /// Probability of being within.
+    /// Probability of being within the limit.
     pub probability: Option<f64>,
     /// The result.
     pub verdict: Verdict,

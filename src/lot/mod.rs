@@ -1,8 +1,8 @@
-//! Several calibrations of one instrument, or of many of one type, side by side.
+//! Comparison of several calibrations of one instrument, or of many instruments of one type.
 //!
-//! All calibrations are converted to one form, body frame and nominal scale. Results are mean and spread of each
-//! quantity, with a test whether the spread exceeds the σ of the calibrations; outliers; differences from a truth;
-//! limits.
+//! All calibrations are converted to one form, body frame and nominal scale. The results are the mean and spread of
+//! each quantity, with a test whether the spread exceeds the σ of the calibrations; outliers; differences from a truth;
+//! and the decisions on limits.
 
 mod joint;
 mod limits;
@@ -31,7 +31,7 @@ pub use scatter::{ChiSquare, Scatter, Spread};
 pub use statistics::{FALSE_ALARM, Statistics};
 pub use unit::{Calibrated, Row, Unit};
 
-/// Calibrations side by side.
+/// The calibrations that are compared.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lot {
     /// Every unit, in the order given.
@@ -40,18 +40,18 @@ pub struct Lot {
     pub truth: Option<Row>,
     /// The common body frame: the accelerometer frame if any record is in it.
     pub body_frame: BodyFrame,
-    /// Nominal scales by which all are normalised: for each axis, the median of the values stated in the runs; if none
-    /// are stated, the scale factors of the truth, or of the first calibration.
+    /// Nominal scales by which all calibrations are normalised: for each axis, the median of the values stated in the
+    /// runs; if none are stated, the scale factors of the truth, or of the first calibration.
     pub nominal: PerSensor<Nominal>,
     /// Whether a run states nominal scales.
     pub nominal_is_stated: bool,
-    /// Relative 1σ of gravity, if all units were calibrated at one site and therefore share its error. This σ is part
-    /// of each unit's σ and of the mean's σ, but not of the scatter.
+    /// Relative 1σ of gravity, if all units were calibrated at one site and therefore have the gravity error in common.
+    /// This σ is part of each unit's σ and of the mean's σ, but not of the scatter.
     pub shared_gravity: Option<f64>,
     /// Every quantity that at least two units have.
     pub statistics: Vec<Statistics>,
     /// χ² of the scatter of all parameters with their correlations, over the units that give correlations; `None` if
-    /// fewer than two do.
+    /// fewer than two units give correlations.
     pub joint: Option<ChiSquare>,
     /// The limits for units; `None` if there are none.
     pub specification: Option<Specification>,
@@ -127,8 +127,8 @@ impl Lot {
         self.truth.as_ref().or(first)
     }
 
-    /// Another unit's value minus that of the reference, with its 1σ as if both came from independent data except for
-    /// gravity.
+    /// The value of another unit minus the value of the reference, with its 1σ, assuming that the data of both are
+    /// independent except for gravity.
     pub fn difference(&self, row: &Row, quantity: Quantity) -> Option<Sample> {
         let reference = self.reference().filter(|from| !std::ptr::eq(*from, row));
         let (own, from) = (row.sample(quantity)?, reference?.sample(quantity)?);
@@ -213,11 +213,12 @@ fn usable<'a>(
 ) -> Result<&'a Calibrated, String> {
     let calibrated = unit.calibrated.as_ref().map_err(Clone::clone)?;
     if calibrated.calibration.converged == Some(false) {
-        return Err("not converged; do not use the values or σ".to_owned());
+        return Err("the calibration did not converge; do not use the values or σ".to_owned());
     }
     match (calibrated.calibration.unit.as_ref(), output) {
         (Some(own), Some(common)) if own != common => Err(format!(
-            "outputs are `{}` and `{}`, but most calibrations have `{}` and `{}`. Give calibrations in one unit",
+            "the outputs are in `{}` and `{}`, but most calibrations have outputs in `{}` and `{}`. Give calibrations \
+             with the same units",
             own.gyro, own.accel, common.gyro, common.accel
         )),
         _ => Ok(calibrated),

@@ -4,7 +4,7 @@ use crate::calibration::result::frame::free_parameters;
 use crate::calibration::{AUXILIARY, auxiliary_name, parameter_name, sensor_and_parameter};
 use crate::imu::{AXES, BodyFrame, InstallationForm, ParameterKind, Sensor, Triad};
 
-/// Every axis of both triads.
+/// All axes of both triads.
 pub fn axes() -> impl Iterator<Item = (Sensor, usize)> {
     let axes = |sensor| (0..AXES.len()).map(move |axis| (sensor, axis));
     Sensor::ALL.into_iter().flat_map(axes)
@@ -58,7 +58,7 @@ impl Quantity {
 /// A value with its 1σ.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample {
-    /// Normalised value, in SI.
+    /// Normalised value, in SI units.
     pub value: f64,
     /// 1σ of the value; zero if none is stated.
     pub sigma: f64,

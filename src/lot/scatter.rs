@@ -1,9 +1,10 @@
 //! Scatter of values with their own σ.
 //!
-//! Value k is `μ + τ a + σ_k b`, a and b standard normal: τ is the spread between units. With `w_k = 1/(τ² + σ_k²)` and
-//! the weighted mean `m`, `Q(τ²) = Σ w_k (x_k − m)²` follows χ² of n − 1 degrees of freedom at the true τ and falls
-//! with τ²: τ is where Q is n − 1 (Paule, Mandel, *J. Res. NBS* 87, 1982, 377), its interval where Q is at the quantiles
-//! of χ² (Viechtbauer, *Statistics in Medicine* 26, 2007, 37).
+//! The value k is `μ + τ a + σ_k b` with standard normal a and b, where τ is the spread between units. With
+//! `w_k = 1/(τ² + σ_k²)` and the weighted mean `m`, `Q(τ²) = Σ w_k (x_k − m)²` follows χ² with n − 1 degrees of freedom
+//! at the true τ and decreases with τ². The estimate of τ is the value at which Q is n − 1 (Paule, Mandel, *J. Res.
+//! NBS* 87, 1982, 377), and its interval ends where Q equals quantiles of χ² (Viechtbauer, *Statistics in Medicine* 26,
+//! 2007, 37).
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -21,19 +22,20 @@ pub struct ChiSquare {
     pub value: f64,
     /// Degrees of freedom.
     pub freedom: usize,
-    /// Probability of at least this sum: near zero if the σ are too small; near one if they are too large.
+    /// Probability that the sum is at least as large; near zero if the σ are too small, near one if the σ are too
+    /// large.
     pub p: f64,
 }
 
 impl ChiSquare {
-    /// χ² of a sum with its degrees of freedom; `None` without degrees of freedom.
+    /// χ² of a sum with its degrees of freedom; `None` if there are no degrees of freedom.
     pub fn new(value: f64, freedom: usize) -> Option<Self> {
         let p = ChiSquared::new(freedom as f64).ok()?.sf(value);
         Some(Self { value, freedom, p })
     }
 }
 
-/// The spread between units, without their own σ.
+/// The spread between units after subtracting their own σ.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Spread {
     /// 1σ from unit to unit; zero if the units' own σ explain the scatter.
@@ -45,11 +47,11 @@ pub struct Spread {
 /// Mean and scatter of values with their own σ.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Scatter {
-    /// Mean, weighted by spread and own σ.
+    /// Mean, weighted by the spread and each value's own σ.
     pub mean: f64,
     /// 1σ.
     pub mean_sigma: f64,
-    /// Sample standard deviation, the units' σ included.
+    /// Sample standard deviation, which includes the σ of the units.
     pub deviation: f64,
     /// χ² of the scatter relative to the stated σ alone; `None` if a value has no σ.
     pub chi_square: Option<ChiSquare>,
@@ -68,7 +70,7 @@ fn weighted(samples: &[(f64, f64)], spread: f64) -> (f64, f64, f64) {
     (weights, mean, weighted(&|value| (value - mean).powi(2)))
 }
 
-/// Mean and scatter of values with their variances; `None` for fewer than two.
+/// Mean and scatter of values with their variances; `None` for fewer than two values.
 pub fn scatter(samples: &[(f64, f64)]) -> Option<Scatter> {
     let freedom = samples.len().checked_sub(1).filter(|n| *n > 0)?;
     let n = freedom as f64;
@@ -126,9 +128,9 @@ fn spread_where(samples: &[(f64, f64)], q: f64, scale: f64) -> f64 {
     (low * high).sqrt()
 }
 
-/// Indices of outliers, at this false-alarm rate for all values together: the distance of a value
-/// from the weighted mean of the others, relative to its σ, follows Student's t (Grubbs, *Technometrics* 11, 1969, 1).
-/// Fewer than three values have none.
+/// Indices of outliers, at this false-alarm rate for all values together: the distance of a value from the weighted
+/// mean of the others, relative to its σ, follows Student's t (Grubbs, *Technometrics* 11, 1969, 1). Among fewer than
+/// three values, there are no outliers.
 pub fn outliers(samples: &[(f64, f64)], scatter: &Scatter, false_alarm: f64) -> Vec<usize> {
     let n = samples.len() as f64;
     if n < 3.0 {

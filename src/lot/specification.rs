@@ -12,7 +12,7 @@ use turncal_input::FileError;
 use turncal_input::small_file;
 use turncal_input::{Document, Finite, Positive};
 
-/// The version of the format.
+/// The version of the file format.
 const FORMAT: &str = "turncal-specification/1";
 /// Default confidence.
 const CONFIDENCE: f64 = 0.95;

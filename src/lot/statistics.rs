@@ -8,7 +8,7 @@ use crate::imu::BodyFrame;
 /// False-alarm rate of outliers, and of significant spreads, for all quantities together.
 pub const FALSE_ALARM: f64 = 0.01;
 
-/// Statistics of one quantity over the units that state a σ for it, or over all if fewer than two do.
+/// Statistics of one quantity over the units that state its σ, or over all units if fewer than two state a σ.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Statistics {
     /// The quantity.

@@ -1,4 +1,4 @@
-//! One calibration among others.
+//! One of the calibrations in a comparison.
 
 use std::collections::BTreeMap;
 
@@ -15,7 +15,7 @@ use crate::noise::RestNoise;
 pub struct Unit {
     /// Name, unique among the units.
     pub name: String,
-    /// `[meta]` of its run, if that could be read.
+    /// `[meta]` of the unit's run, if it could be read.
     pub meta: BTreeMap<String, String>,
     /// Calibration, or the reason for failure.
     pub calibrated: Result<Calibrated, String>,
@@ -41,17 +41,17 @@ impl Unit {
 pub struct Calibrated {
     /// The calibration.
     pub calibration: Calibration,
-    /// Noise of each axis at rest; `None` if no dwell is long enough, or without a recording.
+    /// Noise of each axis at rest; `None` if no dwell is long enough or there is no recording.
     pub noise: Option<RestNoise>,
 }
 
 impl Calibrated {
-    /// Nominal scales of its run, in the file's quantity, if they are stated.
+    /// Nominal scales of the unit's run, in the file's quantity, if they are stated.
     pub fn nominal(&self) -> Option<&PerSensor<[f64; 3]>> {
         Some(&self.calibration.provenance.as_ref()?.nominal)
     }
 
-    /// The noise at rest, normalised by these scales instead of those of its run.
+    /// The noise at rest, normalised by these scales instead of the scales of the run.
     pub fn noise_by(&self, nominal: &PerSensor<Nominal>) -> Option<RestNoise> {
         let (own, mut noise) = (self.nominal()?, self.noise?);
         for (sensor, axis) in axes() {
@@ -69,9 +69,10 @@ pub struct Row {
     pub unit: Unit,
     /// Calibration in the common form, or the reason why it cannot be used.
     pub canonical: Result<Canonical, String>,
-    /// Noise at rest, by the common nominal scales; `None` if it is not known.
+    /// Noise at rest, normalised by the common nominal scales; `None` if it is not known.
     pub noise: Option<RestNoise>,
-    /// Consistency of its difference from the truth with its covariance; `None` without truth or correlations.
+    /// Consistency of the difference from the truth with the covariance; `None` without a truth or without
+    /// correlations.
     pub nees: Option<Nees>,
     /// Checks against the limits.
     pub checks: Vec<Check>,

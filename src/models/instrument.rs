@@ -1,4 +1,4 @@
-//! Instruments and installations: grades of uncalibrated instruments.
+//! Instruments and installations, which describe grades of uncalibrated instruments.
 
 use nalgebra::{SVector, Vector3};
 use rand::Rng;
@@ -26,7 +26,7 @@ pub struct Instrument {
     pub noise: PerSensor<Noise>,
     /// Variation between instruments of the grade before calibration.
     pub variation: PerSensor<Variation>,
-    /// 1σ of each error-term parameter, with mean zero; 0 for terms that the instrument does not have.
+    /// 1σ of each parameter of an error term, with a mean of zero; 0 for terms that the instrument does not have.
     pub term_sigma: TermVector,
     /// Error terms that are stated to be absent.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -77,7 +77,7 @@ impl Spread {
         self.mean
     }
 
-    /// Standard deviation; a uniform ±a has a/√3.
+    /// Standard deviation; for a uniform distribution within ±a, a/√3.
     pub fn sigma(&self) -> f64 {
         match self.shape {
             Shape::Uniform(half_width) => half_width / 3f64.sqrt(),
@@ -114,7 +114,7 @@ impl InstallationModel {
     /// Finds and reads an installation.
     ///
     /// # Errors
-    /// If it does not exist or is malformed.
+    /// Returns an error if the model does not exist or is malformed.
     pub fn load(name_or_path: &str, named_in: &Place) -> Result<Self, ModelError> {
         let file: InstallationFile = text(Room::Installation, name_or_path, named_in)?.parse()?;
         Ok(Self {
@@ -123,7 +123,7 @@ impl InstallationModel {
         })
     }
 
-    /// One draw of the angles of the form.
+    /// One random draw of the angles of the form.
     pub fn draw(&self, rng: &mut impl Rng) -> SVector<f64, ANGLES> {
         let mut angles = SVector::<f64, ANGLES>::zeros();
         for angle in angles.iter_mut().take(self.form.angle_names().len()) {
@@ -134,7 +134,7 @@ impl InstallationModel {
 }
 
 impl Instrument {
-    /// 1σ tolerances before calibration, for a log of such an instrument.
+    /// 1σ tolerances of such an instrument before calibration, for use with its log.
     pub fn tolerances(&self) -> Tolerances {
         Tolerances {
             scale: PerSensor::from_fn(|sensor| self.variation.get(sensor).scale.sigma()),
@@ -146,7 +146,7 @@ impl Instrument {
     /// Finds and reads an instrument.
     ///
     /// # Errors
-    /// If it does not exist or is malformed.
+    /// Returns an error if the model does not exist or is malformed.
     pub fn load(name_or_path: &str, named_in: &Place) -> Result<Self, ModelError> {
         let text = text(Room::Imu, name_or_path, named_in)?;
         let InstrumentFile { gyro, accel, terms } = text.parse()?;

@@ -15,7 +15,7 @@ use turncal_input::{Finite, NonNegative, Positive};
 /// Finds and reads a turntable; returns it with its name.
 ///
 /// # Errors
-/// If it does not exist or is malformed.
+/// Returns an error if the model does not exist or is malformed.
 pub fn turntable(name_or_path: &str, named_in: &Place) -> Result<(Table, String), ModelError> {
     let text = text(Room::Turntable, name_or_path, named_in)?;
     let file: TableFile = text.parse()?;
@@ -48,11 +48,10 @@ pub fn turntable(name_or_path: &str, named_in: &Place) -> Result<(Table, String)
     Ok((table, text.name()))
 }
 
-/// Finds and reads a path; returns it with its name. Directions such as `earth-rate` are those of
-/// the site.
+/// Finds and reads a path; returns it with its name. Directions such as `earth-rate` are those at the site.
 ///
 /// # Errors
-/// If it does not exist or is malformed.
+/// Returns an error if the model does not exist or is malformed.
 pub fn path(
     name_or_path: &str,
     named_in: &Place,
@@ -68,7 +67,7 @@ pub fn path(
         }
         _ => {
             return Err(text.inconsistent(
-                "expected either [axes] or [body], depending on the axes that the path turns about",
+                "expected either [axes] or [body], depending on which axes the path turns about",
             ));
         }
     };

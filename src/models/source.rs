@@ -1,4 +1,4 @@
-//! Source of a model: a user's file, or embedded text.
+//! Source of a model, which is a file of the user or embedded text.
 
 use std::path::{Path, PathBuf};
 
@@ -30,7 +30,7 @@ pub enum Room {
 }
 
 impl Room {
-    /// All folders, in order of frequency of use.
+    /// All folders, the most frequently used first.
     pub const ALL: [Self; 8] = [
         Self::Scenario,
         Self::Campaign,
@@ -69,7 +69,7 @@ static MODELS: Dir = include_dir::include_dir!("$CARGO_MANIFEST_DIR/models");
 /// Error in finding or reading a model.
 #[derive(Debug, thiserror::Error)]
 pub enum ModelError {
-    /// Neither a file nor an embedded name.
+    /// The name is neither a file nor an embedded name.
     #[error(
         "{named_in}no {room} model \"{name}\"{}: it is neither a file nor one of the models {known}",
         nearest.map_or_else(String::new, |nearest| format!(" (did you mean \"{nearest}\"?)"))
@@ -86,7 +86,7 @@ pub enum ModelError {
         /// All embedded names.
         known: String,
     },
-    /// An unreadable or invalid file.
+    /// The file cannot be read or is invalid.
     #[error(transparent)]
     File(#[from] FileError),
 }
@@ -96,14 +96,14 @@ pub fn names(room: Room) -> impl Iterator<Item = &'static str> {
     room.embedded().map(|(name, _)| name)
 }
 
-/// Place where a model is referred to; it determines how the name is resolved.
+/// Location from which a model is referred to, which determines how the name is resolved.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Place {
-    /// On the command line: a path from the working directory, or an embedded name.
+    /// The command line: the name is a path relative to the working directory, or an embedded name.
     CommandLine,
-    /// In this file: a path from its folder, or an embedded name.
+    /// This file: the name is a path relative to the folder of the file, or an embedded name.
     File(PathBuf),
-    /// In an embedded model: an embedded name.
+    /// An embedded model: the name is an embedded name.
     Embedded,
 }
 
@@ -112,9 +112,9 @@ pub enum Place {
 pub struct Text {
     /// The file's content.
     pub text: String,
-    /// File name for messages.
+    /// File name used in messages.
     pub file: String,
-    /// Place of the models that it refers to.
+    /// Location of this model, from which its references to other models are resolved.
     pub place: Place,
 }
 
@@ -129,13 +129,13 @@ impl Text {
     /// The fields of the model.
     ///
     /// # Errors
-    /// If a field is missing, unknown or cannot be right.
+    /// Returns an error if a field is missing, unknown or cannot be right.
     pub fn parse<T: DeserializeOwned>(&self) -> Result<T, ModelError> {
         let document = self.document();
         Ok(document.fill(document.parse()?)?)
     }
 
-    /// The text with its name, for errors with a line number.
+    /// The text with its file name, for errors with a line number.
     pub fn document(&self) -> Document<'_> {
         Document {
             file: Path::new(&self.file),
@@ -143,13 +143,13 @@ impl Text {
         }
     }
 
-    /// Error for inconsistent values: problem and remedy.
+    /// Error for inconsistent values, with problem and remedy.
     pub fn inconsistent(&self, message: impl Into<String>) -> ModelError {
         inconsistent(&self.file, message)
     }
 }
 
-/// Error for inconsistent values in a named file: problem and remedy.
+/// Error for inconsistent values in a named file, with problem and remedy.
 pub fn inconsistent(file: &str, message: impl Into<String>) -> ModelError {
     let error = FileError {
         file: file.into(),
@@ -162,7 +162,7 @@ pub fn inconsistent(file: &str, message: impl Into<String>) -> ModelError {
 /// Finds a model: the file at `name_or_path` if it exists, otherwise the embedded model with that name.
 ///
 /// # Errors
-/// If there is neither, or the file cannot be read.
+/// Returns an error if there is no file or embedded model of this name, or the file cannot be read.
 pub fn text(room: Room, name_or_path: &str, named_in: &Place) -> Result<Text, ModelError> {
     let path = match named_in {
         Place::CommandLine => Some(PathBuf::from(name_or_path)),

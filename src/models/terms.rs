@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::imu::{Term, TermVector};
 use turncal_input::{Document, FileError, NonNegative};
 
-/// 1σ of each parameter of an error term, with mean zero; 0 if the instrument is known not to have the term.
+/// 1σ of each parameter of an error term, whose mean is zero; 0 if the instrument is known not to have the term.
 #[derive(Clone, Copy, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TermFile {
@@ -15,7 +15,8 @@ pub struct TermFile {
     pub sigma: NonNegative,
 }
 
-/// 1σ of the parameters of enabled error terms, in SI, zero for the others; and the terms stated to be absent.
+/// Returns the 1σ of the parameters of enabled error terms, in SI units (zero for the others), and the terms stated to
+/// be absent.
 pub fn stated_terms(
     document: Document,
     table: &str,

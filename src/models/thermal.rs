@@ -30,7 +30,7 @@ impl ThermalVariation {
         }
     }
 
-    /// 1σ of each parameter's coefficients: of T, of T², of dT/dt; per K, K² and K/s.
+    /// 1σ of the coefficients of T, T² and dT/dt of each parameter, per K, K² and K/s.
     pub fn sigma(&self) -> [TriadVector; 3] {
         let of = |by: [f64; 3]| {
             TriadVector::from_fn(|parameter, _| match Triad::kind(parameter) {
@@ -46,10 +46,11 @@ impl ThermalVariation {
 /// Seconds per minute, because rates are stated per K/min.
 const MINUTE: f64 = 60.0;
 
-/// `[gyro.temperature]` or `[accel.temperature]` in an instrument file: 1σ of each, zero if not stated.
+/// `[gyro.temperature]` or `[accel.temperature]` in an instrument file: the 1σ of each coefficient, zero if not stated.
 pub type ThermalFile = BTreeMap<String, NonNegative>;
 
-/// Scale for 1 K and 1 K² in ppm, misalignment for 1 K in arc seconds, and bias for 1 K, 1 K² and 1 K/min in °/h or µg.
+/// Scale factor for 1 K and 1 K² in ppm, misalignment for 1 K in arc seconds, and bias for 1 K, 1 K² and 1 K/min in °/h
+/// or µg.
 pub fn thermal_variation(
     document: Document,
     sensor: Sensor,

@@ -10,7 +10,7 @@ use turncal_input::{Finite, NonNegative, Positive};
 /// Finds and reads a trajectory; returns it with its name.
 ///
 /// # Errors
-/// If it does not exist, is malformed or cannot be followed.
+/// Returns an error if the trajectory does not exist, is malformed or cannot be followed.
 pub fn trajectory(
     name_or_path: &str,
     named_in: &Place,

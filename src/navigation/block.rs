@@ -1,4 +1,4 @@
-//! Interface of navigation to a filter: the error model over a range of samples.
+//! Interface between navigation and a filter: the error model over a range of samples.
 
 use std::sync::Arc;
 
@@ -36,9 +36,9 @@ impl State {
 /// The error model over a stretch of samples: the rows of the transition matrix that differ from
 /// identity, the inputs of process noise, and the computed state at the end.
 ///
-/// Errors: φ in `C_computed = (I − [φ×]) C_true` (rad), δV and δp computed − true (m/s, m), all
-/// East-North-Up; parameter errors δθ true − estimated, in the order of [`crate::imu::TriadVector`]. With these signs
-/// (Eq. 13 at a stationary site)
+/// Errors: φ in `C_computed = (I − [φ×]) C_true` (rad), δV and δp computed − true (m/s, m), all East-North-Up;
+/// parameter errors δθ true − estimated, in the order of [`crate::imu::TriadVector`]. With these signs, Eq. 13 at a
+/// stationary site is
 ///
 /// `φ̇ = −ω_ie × φ − C_b_n B_g δθ_g`, `δV̇ = f_n × φ − 2ω_ie × δV + C_b_n B_a δθ_a`, `δṗ = δV`,
 /// `B = (K̂Ĉ)⁻¹ ∂(K C u + D)/∂θ`.
@@ -56,18 +56,19 @@ pub struct Block {
     pub gravity: ErrorVector,
     /// Transition from the parameter errors of enabled error terms.
     pub terms: Vec<TermColumn>,
-    /// Functions of temperature in the block: the transition from a coefficient's error is that from its
-    /// parameter's error times its function. `None` if parameters do not depend on temperature.
+    /// Functions of temperature in the block. The transition from the error of a coefficient is the transition from the
+    /// error of its parameter, multiplied by the temperature function. `None` if parameters do not depend on
+    /// temperature.
     pub thermal: Option<Box<ThermalState>>,
-    /// Inputs of process noise, which give its covariance for any densities.
+    /// Inputs of process noise, from which its covariance follows for any densities.
     pub noise: NoiseInputs,
 }
 
 /// Effect of the error of one term parameter on the navigation errors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TermColumn {
-    /// The parameter's index among [`crate::imu::TERM_PARAMETERS`].
+    /// Index of the parameter among [`crate::imu::TERM_PARAMETERS`].
     pub parameter: usize,
-    /// Navigation errors per error of the parameter, true − estimated.
+    /// Navigation errors for a unit error of the parameter, true − estimated.
     pub column: ErrorVector,
 }

@@ -37,18 +37,17 @@ pub type InputMatrix = SMatrix<f64, STATES, INPUTS>;
 ///
 /// Eq. 13 as printed has errors that are corrected here (Groves, 2nd ed., §14.2.4, has the same model
 /// in North-East-Down):
-/// * `δλ̇ = δV_E sec L/(R_N+h) + δL V_E tan L sec L/(R_N+h) − δh V_E sec L/(R_N+h)²`; printed, the
-///   first term lacks sec L and the second has a minus.
-/// * `R_M` and `R_N` are the radii of the meridian and of the prime vertical; printed, they are called equatorial and
-///   polar radius.
-/// * The brackets in `δV̇` and `φ̇` are errors of the sensed quantity, `û − u`, not `û`; and ε and ∇ at
-///   the end of the lines are these same errors, not to be counted twice.
-/// * `V × (2δω_ie + δω_en)` belongs to `δV̇` as printed; the change of gravity with height and latitude (not printed)
-///   is added; without it, a free height would have no instability.
+/// * `δλ̇ = δV_E sec L/(R_N+h) + δL V_E tan L sec L/(R_N+h) − δh V_E sec L/(R_N+h)²`; as printed, the first term lacks
+///   sec L and the second has a minus sign.
+/// * `R_M` and `R_N` are the radii of the meridian and of the prime vertical; the paper calls them equatorial and polar
+///   radius.
+/// * The brackets in `δV̇` and `φ̇` are errors of the sensed quantity, `û − u`, not `û`; ε and ∇ at the end of the
+///   lines denote the same errors and must not be counted twice.
+/// * As printed, `V × (2δω_ie + δω_en)` belongs to `δV̇`. The change of gravity with height and latitude, which is not
+///   printed, is added; without this term, a free height would not be unstable.
 ///
-/// The linear model neglects that a vertical error of specific force changes the period of the Schuler
-/// oscillation, even if height is held: after a time t the phase error is `ω_s t ∇_U / 2g`, one degree
-/// in 40 h for 0.2 mg.
+/// The linear model neglects that a vertical error of specific force changes the period of the Schuler oscillation,
+/// even if the height is fixed: after a time t the phase error is `ω_s t ∇_U / 2g`, one degree in 40 h for 0.2 mg.
 ///
 /// The change of the radii with latitude is included, so that the model is the exact derivative of
 /// [`super::Strapdown`].
@@ -61,8 +60,8 @@ pub struct ErrorModel {
 }
 
 impl ErrorModel {
-    /// The model about a true state with this specific force along body axes, m/s². If height is held, the errors of
-    /// height and vertical velocity are zero, and seven states remain.
+    /// The model about a true state with this specific force along body axes, m/s². If the height is fixed, the errors
+    /// of height and vertical velocity are zero, and seven states remain.
     pub fn about(truth: &Solution, force: &Vector3<f64>, height: Height) -> Self {
         let (latitude, transport) = (truth.latitude, truth.transport_rate());
         let earth = earth_rate_n(latitude);
@@ -107,10 +106,9 @@ impl ErrorModel {
         }
     }
 
-    /// The exact discrete form over a time in s in which F, G and ε are constant: any time for a body at
-    /// rest or in steady motion, otherwise a time in which attitude and velocity are nearly
-    /// constant (Van Loan, "Computing integrals involving the matrix exponential", IEEE Trans.
-    /// Automatic Control 23, 1978).
+    /// The exact discrete form over a time in s in which F, G and ε are constant: any time for a body at rest or in
+    /// steady motion; otherwise, a time over which attitude and velocity are nearly constant (Van Loan, "Computing
+    /// integrals involving the matrix exponential", IEEE Trans. Automatic Control 23, 1978).
     pub fn over(&self, duration: f64) -> Transition {
         // All entries of the scaled matrix are of the order of the Schuler frequency, so the exponential remains
         // accurate over hours.
@@ -161,7 +159,8 @@ fn transport_slopes(truth: &Solution, transport: &Vector3<f64>) -> (Matrix3<f64>
     (by_velocity, by_position)
 }
 
-/// The error model over a step: `x ← Φ x + Γ ε`; the same for sensitivities to constants, with `∂ε/∂θ` for ε.
+/// The error model over a step: `x ← Φ x + Γ ε`. Sensitivities to constants obey the same equation, with `∂ε/∂θ` in
+/// place of ε.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Transition {
     /// Φ.
@@ -171,7 +170,7 @@ pub struct Transition {
 }
 
 /// `∂x/∂θ`, navigation errors with respect to `N` unknown constants: the input errors themselves (`N = 6`) or the
-/// parameters of both triads ([`PARAMETERS`], [`SensedErrors`]). Zero where navigation starts without errors.
+/// parameters of both triads ([`PARAMETERS`], [`SensedErrors`]). Zero if navigation starts without errors.
 pub type Sensitivity<const N: usize = PARAMETERS> = SMatrix<f64, STATES, N>;
 
 /// `∂ε/∂θ`, errors of the sensed rate and force with respect to parameter errors δθ = true − estimated: `(K̂Ĉ)⁻¹ ∂(K C
@@ -180,7 +179,7 @@ pub type Sensitivity<const N: usize = PARAMETERS> = SMatrix<f64, STATES, N>;
 pub struct SensedErrors(PerSensor<Response>);
 
 impl SensedErrors {
-    /// The sensed errors of these triads.
+    /// The errors in the quantities that these triads sense.
     ///
     /// # Errors
     /// A triad whose sensitivity is singular.
@@ -210,7 +209,7 @@ impl SensedErrors {
     }
 }
 
-/// The linear error model at one moment, with the height held: `ẋ = F x + G (∂ε/∂θ) θ`.
+/// The linear error model at one moment, with the height fixed: `ẋ = F x + G (∂ε/∂θ) θ`.
 #[derive(Debug, Clone)]
 pub struct Linearisation {
     dynamics: Rows<STATES, STATES>,
@@ -236,7 +235,7 @@ impl Linearisation {
 }
 
 impl Instant {
-    /// The linear error model here, with the height held.
+    /// The linear error model at this moment, with the height fixed.
     pub fn linear_model(&self) -> ErrorModel {
         let held = Height::Held {
             height: self.truth.height,

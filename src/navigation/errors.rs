@@ -11,9 +11,9 @@ pub const POSITION: usize = 6;
 /// Number of states.
 pub const STATES: usize = 9;
 
-/// A vector of the states.
+/// A vector of the navigation states.
 pub type ErrorVector = SVector<f64, STATES>;
-/// A matrix of the states.
+/// A matrix of the navigation states.
 pub type ErrorMatrix = SMatrix<f64, STATES, STATES>;
 
 /// Attitude, velocity and position in one vector.
@@ -35,7 +35,7 @@ pub fn blocks<const N: usize>(blocks: &[(usize, usize, Matrix3<f64>)]) -> SMatri
 /// `R` rows of `N` columns, stored transposed, so that operations on all columns access memory contiguously.
 pub type Rows<const R: usize, const N: usize> = SMatrix<f64, N, R>;
 
-/// A short time interval at the site.
+/// A short interval of time at the site.
 pub struct Span {
     /// Rotation of the Earth, rad.
     pub earth_turn: Vector3<f64>,
@@ -46,8 +46,8 @@ pub struct Span {
 }
 
 impl Span {
-    /// Propagates errors of any origin: Earth rotation rotates them, force couples with tilt, velocity changes
-    /// position.
+    /// Propagates errors of any origin. Earth rotation rotates the errors, specific force couples with tilt, and
+    /// velocity errors change the position.
     #[inline]
     pub fn carry<const N: usize>(&self, errors: &mut Rows<STATES, N>) {
         for cause in 0..N {

@@ -1,4 +1,5 @@
-//! Coning and sculling: from increments to the rotation and the velocity change of one sample, or of many at rest.
+//! Coning and sculling: conversion of increments to the rotation and the velocity change of one sample, or of many
+//! samples at rest.
 
 use std::ops::Range;
 
@@ -27,9 +28,9 @@ pub struct Motion {
 }
 
 impl Increments {
-    /// Coning and sculling over this sample and the previous one, exact to third order in the period; the rotation term
-    /// includes `α×(α×Δv)/6`, without which specific force would be 2 ppm too small in a steady turn at 20°/s and 100
-    /// Hz.
+    /// Coning and sculling over this sample and the previous one, exact to third order in the sample period. The
+    /// rotation term includes `α×(α×Δv)/6`; without this term, specific force would be 2 ppm too small in a steady turn
+    /// at 20°/s and 100 Hz.
     ///
     /// Source: Savage 1998, "Strapdown inertial navigation integration algorithm design", part 1
     /// (coning `Δα_{m−1} × Δα_m / 12`) and part 2 (velocity rotation compensation and sculling).
@@ -52,12 +53,12 @@ impl Increments {
     }
 }
 
-/// Sums over consecutive samples of a body at rest, of the uncalibrated outputs of the triads: they give the motion to
-/// second order for any calibration, without the samples.
+/// Sums of the uncalibrated outputs of the triads over consecutive samples of a body at rest. For any calibration, the
+/// motion follows from these sums to second order, without the samples.
 ///
-/// At rest, everything except noise and vibration is the same in every sample, so products are formed of the
-/// deviations from the mean. A calibration `u = A N − b` acts on the sums exactly:
-/// `A x × A y = cof(A)(x × y)`, and `Σ (A x)(B y)ᵀ = A (Σ x yᵀ) Bᵀ`.
+/// At rest, everything except noise and vibration is the same in every sample, so the products are computed from the
+/// deviations from the mean. A calibration `u = A N − b` acts on the sums exactly: `A x × A y = cof(A)(x × y)`, and
+/// `Σ (A x)(B y)ᵀ = A (Σ x yᵀ) Bᵀ`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sums {
     /// Number of samples.
@@ -132,7 +133,8 @@ impl Sums {
 
     /// Rotation and velocity change for these integrals, with second-order terms from the sums.
     ///
-    /// Source: as for [`Increments::motion`]; the sums contain its terms with neighbouring samples.
+    /// The source is that of [`Increments::motion`]; the sums contain the terms of that function with neighbouring
+    /// samples.
     pub fn motion(&self, increments: &Increments, instrument: &PerSensor<Instrument>) -> Motion {
         let [gyro, accel] = [&instrument.gyro, &instrument.accel].map(|triad| &triad.correction);
         let (later_angle, later_velocity) = (gyro * self.later.gyro, accel * self.later.accel);

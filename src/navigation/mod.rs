@@ -1,13 +1,13 @@
-//! Strapdown navigation and its error model, in two forms.
+//! Strapdown navigation and its error model; there are two forms of each.
 //!
-//! [`Navigator`] serves calibration: its frame is fixed to the Earth at the site (East-North-Up
-//! there). A turntable does not travel, so gravity and Earth rate are those of the site, not of
-//! the computed position, and there is no transport rate: the equations are exact for the truth
-//! (`V = 0` at rest) and linear in velocity and position.
+//! [`Navigator`] serves calibration. The frame of the first form is fixed to the Earth and is East-North-Up at the
+//! site. A turntable does not travel, so gravity and Earth rate are those of the site, not of the computed position,
+//! and there is no transport rate: the equations are exact for the truth (`V = 0` at rest) and linear in velocity and
+//! position.
 //!
 //! [`Strapdown`] is nonlinear navigation on the ellipsoid; [`NonlinearError`] is its deviation from the truth, which
-//! measures a calibration; [`ErrorModel`] is its linear error model, [`NavigationError`] the reported error.
-//! [`Trajectory`] is the true motion of a moving body.
+//! measures the quality of a calibration; [`ErrorModel`] is its linear error model; [`NavigationError`] is the reported
+//! error. [`Trajectory`] is the true motion of a moving body.
 //!
 //! Source: Savage, *Strapdown Analytics*, 2nd ed., ch. 4 and 7; Zhao, Jiang, Li 2016, Eq. 13.
 

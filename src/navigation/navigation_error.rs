@@ -1,4 +1,4 @@
-//! Navigation errors as reported.
+//! Navigation errors in the form in which they are reported.
 
 use std::f64::consts::{PI, TAU};
 
@@ -17,8 +17,8 @@ pub struct NavigationError {
     pub attitude: Vector3<f64>,
     /// Velocity, East-North-Up, m/s.
     pub velocity: Vector3<f64>,
-    /// Position in m on the ellipsoid: `R_N cos L δλ` east with the true latitude, `R_M δL` north, and
-    /// height.
+    /// Position error in m on the ellipsoid: `R_N cos L δλ` east (with the true latitude), `R_M δL` north, and the
+    /// height error.
     pub position: Vector3<f64>,
 }
 
@@ -49,7 +49,7 @@ impl NavigationError {
         self.position.xy().norm()
     }
 
-    /// Pitch, roll, heading; velocity; position: the order of [`Self::by_state`].
+    /// Pitch, roll and heading, then velocity, then position, which is the order of [`Self::by_state`].
     pub fn to_vector(&self) -> ErrorVector {
         joined([self.attitude, self.velocity, self.position])
     }

@@ -1,7 +1,7 @@
-//! Deviation of computed navigation from the truth: exact and nonlinear.
+//! The exact, nonlinear deviation of computed navigation from the truth.
 //!
-//! True and computed solution obey the same equations (those of [`super::Strapdown`]). Their difference obeys the
-//! difference of these equations, without approximation: with `E = Ĉ Cᵀ` (hats mark computed quantities)
+//! The true and the computed solution obey the same equations, those of [`super::Strapdown`]. Their difference obeys
+//! the difference of these equations, without approximation: with `E = Ĉ Cᵀ` (hats mark computed quantities)
 //!
 //! `Ė = E [C δω×] + E [ω_in×] − [ω̂_in×] E`, `δω = ω̂_ib − ω_ib`,
 //!
@@ -46,7 +46,7 @@ impl NonlinearError {
         Self(errors)
     }
 
-    /// Advances by a step of this duration in s, with this forcing at start, middle and end.
+    /// Advances by a step of this duration in s, with this forcing at its start, middle and end.
     ///
     /// # Errors If the computed position comes too close to a pole.
     pub fn advance(&mut self, duration: f64, driven: [&Forcing; 3]) -> Result<(), NearPole> {
@@ -60,7 +60,7 @@ impl NonlinearError {
         Ok(())
     }
 
-    /// The computed solution for this true one.
+    /// The computed solution that corresponds to this true solution.
     pub fn computed(&self, truth: &Solution) -> Solution {
         let cross = skew(self.0.fixed_rows::<3>(ATTITUDE).into_owned());
         let turn = Matrix3::identity() + (cross * self.0[SCALAR] + cross * cross) * 2.0;

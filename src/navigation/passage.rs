@@ -1,4 +1,4 @@
-//! The error model of many samples, from integrals over a few at a time.
+//! The error model over many samples, computed from integrals over a few samples at a time.
 
 use std::sync::Arc;
 
@@ -139,8 +139,8 @@ impl Passage {
         }
     }
 
-    /// Propagates all errors over the samples added since the last part. `bridged` is the covariance, in `n`, added by
-    /// interpolated samples of each triad to the integral of its input over it, rad² and (m/s)².
+    /// Propagates all errors over the samples added since the last part. `bridged` is the covariance, in `n`, that
+    /// interpolated samples of each triad add to the integral of its input over this part, rad² and (m/s)².
     pub fn end_part(&mut self, bridged: Option<Box<PerSensor<Matrix3<f64>>>>) {
         let mut part = std::mem::take(&mut self.part);
         let over = part.noise.span(&self.noise.earth_rate);

@@ -6,16 +6,16 @@ use super::errors::{ATTITUDE, ErrorMatrix, POSITION, Span, VELOCITY, blocks};
 use crate::attitude::skew;
 use crate::imu::PerSensor;
 
-/// White noise of a triad as 1σ densities, equal on its three axes. Its sources are independent, so their
-/// variances add.
+/// White noise of a triad as 1σ densities, equal on its three axes. The sources are independent, so their variances add
+/// up.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ProcessNoise {
     /// Angle or velocity random walk, rad/√s or (m/s)/√s.
     pub random_walk: f64,
-    /// Noise of moves that grows with their speed: 1σ divided by the root of ∫|ω − ω_ie|² dt (gyros) or ∫|f + g|² dt
-    /// (accelerometers), √s. Scale nonlinearity, bandwidth, timing and size effect grow in this way.
+    /// Noise of moves that grows with the speed of the move: 1σ divided by the root of ∫|ω − ω_ie|² dt (gyros) or ∫|f +
+    /// g|² dt (accelerometers), √s. Scale nonlinearity, bandwidth, timing and size effect grow in this way.
     pub by_motion: f64,
-    /// Noise of moves that grows with their duration, rad/√s or (m/s)/√s.
+    /// Noise of moves that grows with the duration of the move, rad/√s or (m/s)/√s.
     pub by_duration: f64,
 }
 
@@ -29,8 +29,8 @@ pub struct NoiseInputs {
 }
 
 impl NoiseInputs {
-    /// Covariance that noise of these densities adds to the navigation errors at the end. Linear in the
-    /// squares of the densities.
+    /// Covariance that noise with these densities adds to the navigation errors at the end of the block. The covariance
+    /// is linear in the squares of the densities.
     pub fn covariance(&self, noise: &PerSensor<ProcessNoise>) -> ErrorMatrix {
         let mut sum = ErrorMatrix::zeros();
         for (number, part) in self.parts.iter().enumerate() {
@@ -66,7 +66,7 @@ pub struct NoiseInput {
 }
 
 impl NoiseInput {
-    /// The part, on an Earth of this rate in `n`, rad/s.
+    /// The part as an interval with this Earth rate in `n`, rad/s.
     pub fn span(&self, earth_rate: &Vector3<f64>) -> Span {
         Span {
             earth_turn: earth_rate * self.duration,
@@ -75,8 +75,8 @@ impl NoiseInput {
         }
     }
 
-    /// Covariance that noise of these densities adds to the navigation errors. Linear in the squares of
-    /// the densities.
+    /// Covariance that noise of these densities adds to the navigation errors. The covariance is linear in the squares
+    /// of the densities.
     ///
     /// White noise through the chain attitude → velocity → position over the part, specific force constant
     /// in it (Brown and Hwang, *Introduction to Random Signals*, 4th ed., §5.3).

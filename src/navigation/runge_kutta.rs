@@ -2,7 +2,7 @@
 
 use nalgebra::SMatrix;
 
-/// The value of `at` after a step of this duration in s (fourth-order Runge–Kutta), with these derivatives at start,
+/// The value of `at` after a step of this duration in s (fourth-order Runge–Kutta), with the derivatives at its start,
 /// middle and end.
 #[inline]
 pub fn step<const R: usize, const C: usize, F>(

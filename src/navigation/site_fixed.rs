@@ -62,7 +62,7 @@ struct Thermal {
 }
 
 impl<'a> Navigator<'a> {
-    /// Starts at a state with these triads; `None` if a sensitivity is singular.
+    /// Starts in this state with these triads; returns `None` if a sensitivity is singular.
     pub fn new(
         imu: &'a ImuSamples,
         site: &Site,
@@ -117,7 +117,7 @@ impl<'a> Navigator<'a> {
         });
     }
 
-    /// The triads in use.
+    /// The triads that are in use.
     pub fn triads(&self) -> PerSensor<Triad> {
         let Some(thermal) = &self.thermal else {
             return self.triads;
@@ -190,7 +190,8 @@ impl<'a> Navigator<'a> {
         }
     }
 
-    /// Navigates through these samples and returns their block. Coning and sculling use the previous sample, if any.
+    /// Navigates through these samples and returns their block. Coning and sculling use the previous sample, if there
+    /// is one.
     pub fn advance(&mut self, samples: Range<usize>) -> Block {
         let few = samples_of(PART, self.imu.period);
         let parts = samples.len().div_ceil(few);
@@ -250,9 +251,9 @@ impl<'a> Navigator<'a> {
     }
 
     /// The block of these samples for a table at rest in this attitude, with the current state. The sensed input is
-    /// known, so the error model uses the attitude, as for one long sample. If the error model used the samples, their
-    /// noise would enter both the innovations and the sensitivity to scale factors, and the product would look like
-    /// information.
+    /// known, so the error model follows from the attitude, as for one long sample. If the error model used the
+    /// samples, the noise of the samples would enter both the innovations and the sensitivity to scale factors, and the
+    /// product of the two would look like information.
     pub fn standing(&self, attitude: &Matrix3<f64>, samples: Range<usize>) -> Block {
         let duration = samples.len() as f64 * self.imu.period;
         let change = -self.gravity * duration;
@@ -270,7 +271,7 @@ impl<'a> Navigator<'a> {
         self.block(passage)
     }
 
-    /// Does the same as [`Self::standing`] for samples that include interpolated ones, given the block of the same
+    /// Does the same as [`Self::standing`] for samples some of which are interpolated, given the block of the same
     /// number of samples in the same attitude.
     pub fn standing_like(&self, block: &Block, samples: &Range<usize>) -> Block {
         let mut like = block.clone();

@@ -1,4 +1,4 @@
-//! Strapdown navigation on the WGS-84 ellipsoid: attitude, velocity and position, nonlinear.
+//! Nonlinear strapdown navigation on the WGS-84 ellipsoid: attitude, velocity and position.
 //!
 //! With `C = C_b_n`, specific force f and everything in East-North-Up (Groves, *Principles of GNSS,
 //! Inertial, and Multisensor Integrated Navigation Systems*, 2nd ed., §5.4; Titterton and Weston,
@@ -83,7 +83,8 @@ impl Solution {
         }
     }
 
-    /// The instant of a body with constant attitude and velocity in East-North-Up; at zero velocity, of a body at rest.
+    /// The instantaneous motion of a body with constant attitude and velocity in East-North-Up; with zero velocity, the
+    /// body is at rest.
     pub fn steady(&self) -> Instant {
         Instant::of(*self, &Vector3::zeros(), &Vector3::zeros())
     }
@@ -101,8 +102,8 @@ pub struct Instant {
 }
 
 impl Instant {
-    /// The instant of a body that turns relative to East-North-Up (rad/s) while its velocity components change (m/s²),
-    /// both in these axes.
+    /// The instantaneous motion of a body that turns relative to East-North-Up (rad/s) while its velocity components
+    /// change (m/s²), both along East-North-Up.
     pub fn of(truth: Solution, turning: &Vector3<f64>, acceleration: &Vector3<f64>) -> Self {
         let rate = earth_rate_n(truth.latitude) + truth.transport_rate() + turning;
         // The acceleration of an unsupported body is not sensed.
@@ -115,12 +116,12 @@ impl Instant {
     }
 }
 
-/// Treatment of height, whose error grows e-fold in ten minutes if free.
+/// Treatment of the height. The error of a free height grows by a factor of e in every ten minutes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Height {
     /// Free height.
     Free,
-    /// Height (m) and vertical velocity (m/s) are set to those of a reference at the end of the step.
+    /// Height (m) and vertical velocity (m/s) are set to the values of a reference at the end of the step.
     Held {
         /// Height above the ellipsoid in m.
         height: f64,
@@ -129,7 +130,7 @@ pub enum Height {
     },
 }
 
-/// Navigation came too close to a pole.
+/// Navigation comes too close to a pole.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 #[error(
     "navigation reached latitude {:.3}°, but the heading is undefined near a pole in East-North-Up: stay within \
@@ -156,10 +157,10 @@ pub struct Strapdown {
 }
 
 impl Strapdown {
-    /// Starts at a solution; every step is `period` seconds long.
+    /// Starts from a solution; every step is `period` seconds long.
     ///
     /// # Errors
-    /// If the start is too close to a pole.
+    /// Returns an error if the start is too close to a pole.
     pub fn new(start: Solution, period: f64) -> Result<Self, NearPole> {
         within_reach(start.latitude)?;
         Ok(Self {
@@ -177,7 +178,7 @@ impl Strapdown {
     /// Navigates through one step.
     ///
     /// # Errors
-    /// If the step leads too close to a pole; the solution is then unchanged.
+    /// Returns an error if the step leads too close to a pole; the solution is then unchanged.
     pub fn advance(&mut self, increments: &Increments, height: Height) -> Result<(), NearPole> {
         let (period, start) = (self.period, self.solution);
         let before = self.before.unwrap_or(*increments);
@@ -221,7 +222,7 @@ impl Height {
 }
 
 impl Solution {
-    /// The computed solution with these errors relative to this true one.
+    /// The computed solution that has these errors relative to this true solution.
     #[inline]
     pub fn with_errors(&self, errors: &ErrorVector) -> Self {
         let position = errors.fixed_rows::<3>(POSITION).into_owned();

@@ -1,7 +1,7 @@
 //! True motion of a moving body, and the input sensed by an ideal instrument on it.
 //!
-//! Speed, heading and height follow raised-cosine profiles in closed form; so do velocity, attitude and their
-//! derivatives. Latitude and longitude have no closed form and are integrals of the velocity.
+//! Speed, heading and height follow raised-cosine profiles, so these quantities, velocity, attitude and their
+//! derivatives have a closed form. Latitude and longitude have no closed form and are integrals of the velocity.
 
 mod leg;
 mod segment;
@@ -19,9 +19,10 @@ const LEAST_GLIDE: f64 = 2.0;
 /// Minimum total duration of all segments, s.
 const LEAST_ROUND: f64 = 1.0;
 
-/// A start and segments, which repeat.
+/// A start and segments that are repeated.
 ///
-/// The body points along its velocity: heading is the direction of the velocity, pitch its angle above the horizon.
+/// The body points along its velocity: heading is the direction of the velocity, and pitch is its angle above the
+/// horizon.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Trajectory {
     start: Start,
@@ -29,7 +30,7 @@ pub struct Trajectory {
     segments: Vec<Segment>,
 }
 
-/// Errors of segments that a body cannot follow.
+/// Errors for segments that a body cannot follow.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum TrajectoryError {
     /// The segments take no time.
@@ -38,7 +39,7 @@ pub enum TrajectoryError {
         /// Duration of all segments, s.
         found: f64,
     },
-    /// A climb or descent that is too steep.
+    /// A climb or descent is too steep.
     #[error(
         "segment {segment} climbs or descends at {climb:.2} m/s with {speed:.2} m/s of horizontal speed at \
          its start or end; horizontal speed must be at least {:.0} times the climb rate: change speed in a separate \
@@ -46,7 +47,7 @@ pub enum TrajectoryError {
         LEAST_GLIDE
     )]
     Steep {
-        /// Segment, counted from one.
+        /// Number of the segment, counted from one.
         segment: usize,
         /// Climb rate, m/s.
         climb: f64,
@@ -59,7 +60,7 @@ impl Trajectory {
     /// A trajectory of these segments.
     ///
     /// # Errors
-    /// If the segments take no time or a climb is too steep.
+    /// Returns an error if the segments take no time or a climb is too steep.
     pub fn new(start: Start, banks: bool, segments: Vec<Segment>) -> Result<Self, TrajectoryError> {
         let trajectory = Self {
             start,

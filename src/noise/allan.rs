@@ -1,6 +1,6 @@
 //! The overlapping Allan variance.
 
-/// Allan variance of one axis at growing cluster times.
+/// Allan variance of one axis at increasing cluster times.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Curve {
     /// Cluster times τ, s.
@@ -9,7 +9,7 @@ pub struct Curve {
     pub variance: Vec<f64>,
 }
 
-/// The mean of the Allan variances of several curves at the same cluster times.
+/// The mean Allan variance of several curves with the same cluster times.
 pub fn mean(curves: &[&Curve]) -> Curve {
     let tau = curves.first().map_or_else(Vec::new, |of| of.tau.clone());
     let at = |point: usize| curves.iter().map(|of| of.variance[point]).sum::<f64>();

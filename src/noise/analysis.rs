@@ -1,4 +1,4 @@
-//! The analysed stretch of a run, and its noise.
+//! The stretch of a run that is analysed, and its noise.
 
 use std::ops::Range;
 
@@ -24,7 +24,7 @@ pub struct Stretch {
     pub stands: bool,
 }
 
-/// Errors in finding a stretch to analyse.
+/// Reasons why no stretch can be analysed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum StretchError {
     /// No segment has the label.
@@ -58,14 +58,14 @@ fn known(labels: &[String]) -> String {
     let mut quoted: Vec<String> = labels.iter().map(|label| format!("`{label}`")).collect();
     quoted.dedup();
     match quoted.join(", ").as_str() {
-        "" => "the run has no [segments]; omit --segment, or add them to run.toml".to_owned(),
+        "" => "the run has no [segments]; omit --segment, or add [segments] to run.toml".to_owned(),
         quoted => format!("known labels are {quoted}"),
     }
 }
 
 impl Stretch {
-    /// The longest segment with this label; without a label, the longest standstill, or the longest segment
-    /// of a recording that is not continuous.
+    /// The longest segment with this label. Without a label, the longest standstill; if the recording is not
+    /// continuous, the longest segment.
     ///
     /// # Errors [`StretchError`] if there is no such stretch, or if it is too short.
     pub fn find(run: &Run, label: Option<&str>) -> Result<Self, StretchError> {

@@ -11,7 +11,7 @@ use crate::recording::ImuSamples;
 /// White-noise density of each axis that matches the Allan variance of the dwells at one cluster time.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct RestNoise {
-    /// The cluster time, s: a quarter of the median dwell, so that quantisation is small.
+    /// The cluster time, s. This cluster time is a quarter of the median dwell, so that quantisation is small.
     pub tau_s: f64,
     /// Allan deviation times √τ: rad/√s and m/s/√s.
     pub density: PerSensor<[f64; 3]>,
@@ -20,7 +20,7 @@ pub struct RestNoise {
 }
 
 impl RestNoise {
-    /// The noise of the samples in these dwells; `None` if no dwell is long enough.
+    /// The noise at rest from the samples in these dwells; `None` if no dwell is long enough.
     pub fn of(imu: &ImuSamples, dwells: &[Range<usize>]) -> Option<Self> {
         let mut lengths: Vec<usize> = dwells.iter().map(ExactSizeIterator::len).collect();
         lengths.sort_unstable();

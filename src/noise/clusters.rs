@@ -1,10 +1,11 @@
-//! The cluster times of a recording, and the covariance of Allan variances at them under a mixture of processes.
+//! The cluster times of a recording, and the covariance of the Allan variances at these times for a mixture of
+//! processes.
 //!
 //! An overlapping Allan variance is a mean of squared second differences `D`; for Gaussian noise `cov(⟨D₁²⟩, ⟨D₂²⟩) = 2
-//! Σ cov(D₁, D₂)²` over all pairs of positions. In terms of the squared strengths `c_p` this covariance is quadratic,
-//! so one table for each pair of processes serves every mixture. Source: Greenhall, Riley, *Uncertainty of Stability
-//! Variances Based on Finite Differences*, PTTI 2003 (for one process and one cluster time); their equivalent degrees
-//! of freedom (NIST SP 1065, 5.4.1) are `2 σ⁴ / var σ²`.
+//! Σ cov(D₁, D₂)²` over all pairs of positions. This covariance is quadratic in the squared strengths `c_p`, so one
+//! table for each pair of processes serves every mixture. Source: Greenhall, Riley, *Uncertainty of Stability Variances
+//! Based on Finite Differences*, PTTI 2003 (for one process and one cluster time); their equivalent degrees of freedom
+//! (NIST SP 1065, 5.4.1) are `2 σ⁴ / var σ²`.
 
 use std::collections::BTreeMap;
 
@@ -68,8 +69,8 @@ impl Clusters {
         &self.sizes
     }
 
-    /// The covariance of the points of one curve under a mixture of processes with these strengths squared. A
-    /// correlation time counts as the nearest of the tables.
+    /// The covariance of the points of one curve for a mixture of processes with these squared strengths. A correlation
+    /// time is replaced by the nearest one for which there is a table.
     pub fn covariance(&self, mixture: &[(Process, f64)]) -> DMatrix<f64> {
         let log_time = |of: &Process| of.correlation_time().map_or(0.0, f64::ln);
         let table = |process: Process| {
@@ -96,7 +97,7 @@ impl Clusters {
         covariance
     }
 
-    /// The shortest correlation time to try if the fit starts at this cluster time, both in s.
+    /// The shortest correlation time to try, in s, if the fit starts at this cluster time, in s.
     pub fn shortest_time(&self, shortest: f64) -> f64 {
         (SHORTEST * self.period).max(DISTINCT * shortest)
     }

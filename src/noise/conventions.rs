@@ -1,7 +1,7 @@
 //! The conventions for noise figures, and their users.
 //!
-//! Each row of the table is a unit, with its value in SI and the relation of the figure to the strength of the
-//! process. Densities are two-sided (IEEE Std 952): white noise of density N has `σ = N √rate` in samples at that
+//! Each row of the table contains a unit, its value in SI units, and the factor between the figure and the strength of
+//! the process. Densities are two-sided (IEEE Std 952): white noise of density N has `σ = N √rate` in samples at that
 //! rate. Sources: Kalibr, *IMU Noise Model* (wiki); PSINS, `imuerrset`; KF-GINS, its configuration file.
 
 use Scale::{Increments, Linear, Power, Samples};
@@ -129,7 +129,7 @@ static QUANTITIES: [Quantity; 6] = [
         row("°/h/√h", Linear(DEG_PER_H / SQRT_H), "rate random walk: IEEE Std 952", &["deg/h1.5", "deg/h3/2"]),
         row("°/h/√s", Linear(DEG_PER_H), "rate random walk over one second", &[]),
         row("rad/s²/√Hz", Linear(1.0), "Kalibr `gyroscope_random_walk`; rad/s/√s", &["rad/s/sqrts"]),
-        row("°/s²/√Hz", Linear(DEGREE), "the same in degrees: logs of MEMS gyros; °/s/√s", &["deg/s/sqrts"]),
+        row("°/s²/√Hz", Linear(DEGREE), "rate random walk in degrees: logs of MEMS gyros; °/s/√s", &["deg/s/sqrts"]),
         row("°/s/√h", Linear(DEGREE / SQRT_H), "rate random walk over one hour", &[]),
         row("rad²/s³", Power(1.0), "power spectral density of the bias rate: Q of a Kalman filter", &[]),
     ] },
@@ -161,14 +161,14 @@ static QUANTITIES: [Quantity; 6] = [
     ] },
 ];
 
-/// A noise figure in every convention.
+/// A noise figure, converted to every convention.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Conversion {
     /// Name of the quantity.
     pub quantity: &'static str,
-    /// Name of its triad.
+    /// Name of the triad of the quantity.
     pub sensor: &'static str,
-    /// The figure as interpreted.
+    /// The figure, as it was interpreted.
     pub given: Figure,
     /// Sample rate in Hz.
     pub rate_hz: Option<f64>,
@@ -176,7 +176,7 @@ pub struct Conversion {
     pub figures: Vec<Figure>,
 }
 
-/// A noise figure in one convention.
+/// A noise figure, converted to one convention.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Figure {
     /// Value in the unit of the convention.
@@ -186,7 +186,7 @@ pub struct Figure {
     pub convention: &'static Convention,
 }
 
-/// A figure that could not be converted.
+/// Errors for a figure that cannot be converted.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ConversionError {
     /// Unknown unit.
@@ -196,24 +196,24 @@ pub enum ConversionError {
         known()
     )]
     Unknown {
-        /// The unit as given.
+        /// The unit, as given by the user.
         unit: String,
     },
-    /// A figure per sample without the sample rate.
+    /// The figure is noise per sample, but no sample rate is given.
     #[error(
         "`{unit}` is noise per sample, which needs the sample rate: add --rate with the rate in Hz"
     )]
     NoRate {
-        /// The unit as given.
+        /// The unit, as given by the user.
         unit: String,
     },
 }
 
-/// Converts a figure into every convention of its quantity. With a sample rate in Hz, an ambiguous unit is
-/// interpreted as the noise of each sample; without, as a bias instability.
+/// Converts a figure into every convention of its quantity. With a sample rate in Hz, an ambiguous unit is interpreted
+/// as noise per sample; without a sample rate, as a bias instability.
 ///
 /// # Errors
-/// [`ConversionError`] if the unit is not known, or needs a rate.
+/// Returns [`ConversionError`] if the unit is not known, or needs a rate.
 pub fn convert(value: f64, unit: &str, rate: Option<f64>) -> Result<Conversion, ConversionError> {
     let wanted = normalised(unit);
     let matching = || all().filter(|(_, row)| row.names().any(|name| name == wanted));

@@ -1,10 +1,10 @@
-//! Weighted least squares of an Allan variance as a sum of processes.
+//! Weighted least-squares fit of an Allan variance as a sum of processes.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::process::Process;
 
-/// Processes with their strengths squared.
+/// Processes with their squared strengths.
 pub type Mixture = Vec<(Process, f64)>;
 
 /// Allan variance of a mixture at a cluster time.
@@ -56,8 +56,8 @@ impl<'a> Weighted<'a> {
         Some(processes.zip(strengths.iter().copied()).collect())
     }
 
-    /// Covariance of the squared strengths of a fit and, in the last row, of the log correlation time if one of its
-    /// processes has one.
+    /// Covariance of the squared strengths of a fit and, in the last row, of the logarithm of the correlation time if
+    /// one of the processes has a correlation time.
     pub fn covariance(&self, mixture: &[(Process, f64)]) -> Option<DMatrix<f64>> {
         const STEP: f64 = 1e-4;
         let mut columns = self.columns(mixture.iter().map(|(process, _)| *process))?;

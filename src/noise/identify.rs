@@ -1,4 +1,4 @@
-//! Result for a curve: processes with their strengths, limits for processes not found, and intervals.
+//! The result for a curve: processes with their strengths, limits for processes that were not found, and intervals.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
@@ -17,7 +17,7 @@ pub struct Found {
     pub strength: f64,
     /// 1σ of the strength.
     pub sigma: f64,
-    /// 1σ of the log correlation time, if it has one.
+    /// 1σ of the logarithm of the correlation time, if the process has a correlation time.
     pub sigma_log_time: Option<f64>,
 }
 
@@ -28,7 +28,7 @@ impl Found {
     }
 }
 
-/// The process of this kind, if it is among those found.
+/// The process of this kind, if it was found.
 pub fn of_kind(found: &[Found], process: Process) -> Option<&Found> {
     found.iter().find(|f| f.process.same_kind(process))
 }
@@ -38,7 +38,7 @@ pub fn of_kind(found: &[Found], process: Process) -> Option<&Found> {
 pub struct Hidden {
     /// The process.
     pub process: Process,
-    /// Upper limit of its strength, with 95 % probability.
+    /// Upper limit of the strength of the process, with 95 % probability.
     pub limit: f64,
 }
 
@@ -55,7 +55,8 @@ pub struct Identified {
     /// Number of points at the start of the curve (the shortest cluster times) that the processes do not describe
     /// because of sensor bandwidth or pulses.
     pub first: usize,
-    /// Equivalent degrees of freedom of each point; for points that no process describes, those of their scatter.
+    /// Equivalent degrees of freedom of each point; for points that no process describes, the degrees of freedom of
+    /// their scatter.
     pub freedom: Vec<f64>,
     /// Processes for a filter that models white noise and one Gauss–Markov process: the processes found, with the
     /// nearest Gauss–Markov process in place of all other variations.
@@ -69,7 +70,7 @@ impl Identified {
         parts.map(|found| found.allan_variance(tau)).sum()
     }
 
-    /// The interval that contains the Allan variance at a point with this probability, by χ².
+    /// The interval that contains the Allan variance at a point with this probability, from χ².
     pub fn interval(&self, curve: &Curve, point: usize, probability: f64) -> Option<(f64, f64)> {
         let (freedom, variance) = (*self.freedom.get(point)?, *curve.variance.get(point)?);
         let tail = 0.5 * (1.0 - probability);

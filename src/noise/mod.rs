@@ -1,5 +1,4 @@
-//! Noise of an instrument at rest: Allan variance, the underlying processes, and the conventions for noise
-//! figures.
+//! Noise of an instrument at rest: Allan variance, the processes that cause it, and the conventions for noise figures.
 //!
 //! Variances are two-sample (Allan) variances of the rate at a cluster time τ, in (rad/s)² or (m/s²)²,
 //! from the integrals of the output over each sample. Two-sided conventions: white noise of strength N has the

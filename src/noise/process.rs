@@ -4,7 +4,7 @@ use std::f64::consts::{LN_2, PI};
 
 use crate::imu::Noise;
 
-/// A noise process in a rate. Its Allan variance is proportional to its squared strength.
+/// A noise process in a rate. The Allan variance of the process is proportional to the square of its strength.
 ///
 /// Sources: IEEE Std 952-1997, annex C (all terms and the Markov process); El-Sheimy, Hou, Niu,
 /// *Analysis and Modeling of Inertial Sensors Using Allan Variance*, IEEE Trans. Instrum. Meas. 57
@@ -12,7 +12,7 @@ use crate::imu::Noise;
 /// 2003 (generalised autocovariances).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Process {
-    /// White noise of the integral, as from pulses; slope −1, strength Q in rad or m/s.
+    /// White noise of the integral, such as the noise of pulses; slope −1, strength Q in rad or m/s.
     Quantisation,
     /// White noise of the rate; slope −1/2, strength N in rad/√s or (m/s)/√s.
     RandomWalk,
@@ -41,7 +41,7 @@ impl Noise {
 }
 
 impl Process {
-    /// The processes with a distinct slope, shortest cluster times first.
+    /// The processes with a distinct slope, in the order of the cluster times at which they dominate.
     pub const SLOPES: [Self; 5] = [
         Self::Quantisation,
         Self::RandomWalk,

@@ -1,4 +1,4 @@
-//! White noise of a recording without stated noise.
+//! Estimation of the white noise of a recording for which no noise is stated.
 
 use crate::imu::Sensor;
 use crate::recording::ImuSamples;
@@ -11,7 +11,8 @@ const SUMS: [f64; 5] = [0.25, 0.5, 1.0, 2.0, 4.0];
 const FIRST_THIRD: f64 = 0.430_727;
 
 /// Random walk of a triad, rad/√s or (m/s)/√s, from the quieter part of a recording: from second differences of sums,
-/// which are independent of bias and drift. Sums are lengthened until these differences reach the size of a pulse.
+/// which are independent of bias and drift. The sums are made longer until the differences reach the size of a pulse.
+/// Rows that are all rounded to one value have at least the noise of this rounding.
 pub fn white_noise(imu: &ImuSamples, sensor: Sensor) -> f64 {
     let pulse = *imu.pulse.get(sensor);
     let mut found = 0.0;
@@ -25,7 +26,8 @@ pub fn white_noise(imu: &ImuSamples, sensor: Sensor) -> f64 {
             break;
         }
     }
-    found
+    let rounding = imu.resolution(sensor).max() * (imu.period / 12.0).sqrt();
+    found.max(rounding)
 }
 
 /// The lower quartile of the second differences of sums over `length` samples; `None` for a recording without any.

@@ -1,11 +1,11 @@
 //! The search for the most likely combination of processes.
 //!
-//! Generalised least squares of the Allan variance itself, at cluster times half an octave apart, with the covariance
-//! of its points under the fitted mixture. The most likely combination of processes is selected. Each process must
-//! raise twice the log-likelihood by [`SIGNIFICANT`], and a correlation time by [`SIGNIFICANT_TIME`], so that a slope
-//! that is not observed gets no coefficient.
+//! The fit is a generalised least-squares fit of the Allan variance itself, at cluster times half an octave apart, with
+//! the covariance of the points for the fitted mixture. The most likely combination of processes is selected. Each
+//! process must raise twice the log-likelihood by [`SIGNIFICANT`], and a correlation time by [`SIGNIFICANT_TIME`], so
+//! that a slope that is not observed gets no coefficient.
 //!
-//! After El-Sheimy, Hou, Niu 2008 (the slopes) and Guerrier, Skaloud, Stebler, Victoria-Feser,
+//! The method follows El-Sheimy, Hou, Niu 2008 (the slopes) and Guerrier, Skaloud, Stebler, Victoria-Feser,
 //! *Wavelet-Variance-Based Estimation for Composite Stochastic Processes*, JASA 108 (2013) (least squares with the
 //! covariance of the points).
 
@@ -45,11 +45,12 @@ const SHORT_ENDS: [usize; 2] = [2, 4];
 
 impl Clusters {
     /// Identifies the processes in the mean of some curves; `None` if the curves have other cluster times, are too
-    /// short or contain a zero. Averaged axes count as independent.
+    /// short or contain a zero. Averaged axes are treated as independent.
     ///
-    /// At short cluster times, coarse pulses and the bandwidth of a sensor cause deviations that no process
-    /// describes. Such cluster times are dropped, up to half of all, and one octave more for a remainder that is not
-    /// significant. If no start fits, the whole curve is fitted with a misfit.
+    /// At short cluster times, coarse pulses and the bandwidth of a sensor cause deviations that no process describes.
+    /// Up to half of the cluster times, and one additional octave because a remainder may not be significant, are
+    /// dropped for this reason. If the fit fails from every starting point of the curve, the whole curve is fitted with
+    /// a misfit.
     pub fn identify(&self, curves: &[&Curve]) -> Option<Identified> {
         let is_of_these = |of: &&Curve| of.variance.len() == self.sizes().len();
         if !curves.iter().all(is_of_these) {

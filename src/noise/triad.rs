@@ -21,8 +21,9 @@ const PEAK: f64 = 1.89;
 pub struct TriadNoise {
     /// Noise of the axes x, y, z.
     pub axes: [AxisNoise; 3],
-    /// Noise from the mean Allan variance of all axes that vary. If the axes are alike, the mean resolves more than
-    /// each axis alone. Processes found on all axes are kept within the range of the axes.
+    /// Noise from the mean Allan variance of all axes that vary. If the axes are alike, the mean shows more processes
+    /// than the individual axes. Strengths of processes that are found on all axes are kept within the range of the
+    /// axes.
     pub mean: AxisNoise,
 }
 
@@ -31,11 +32,11 @@ pub struct TriadNoise {
 pub struct AxisNoise {
     /// Allan variance of the axis.
     pub curve: Curve,
-    /// Processes identified; `None` if samples do not vary at all.
+    /// The identified processes; `None` if the samples do not vary at all.
     pub identified: Option<Identified>,
-    /// Number of jumps beyond noise.
+    /// Number of jumps that are too large to be noise.
     pub knocks: usize,
-    /// Whether its samples vary only by rounding.
+    /// Whether the samples of the axis vary only by rounding.
     pub is_constant: bool,
 }
 
@@ -122,12 +123,13 @@ impl AxisNoise {
         self.identified.as_ref().map_or(&[], |of| &of.found)
     }
 
-    /// The slopes not found.
+    /// The slopes that were not found.
     pub fn hidden(&self) -> &[Hidden] {
         self.identified.as_ref().map_or(&[], |of| &of.hidden)
     }
 
-    /// Lowest Allan deviation with its cluster time, if not the last; often quoted as bias instability.
+    /// Lowest Allan deviation with its cluster time, unless this is the last one; data sheets often quote this value as
+    /// bias instability.
     pub fn minimum(&self) -> Option<(f64, f64)> {
         let Curve { tau, variance } = &self.curve;
         let points = tau.iter().zip(variance);
@@ -146,8 +148,8 @@ fn knocks(values: &[f64]) -> usize {
 }
 
 /// Result for the mean of several axes, with every process found on all axes. Figures of the mean are kept if they lie
-/// within the range of the axes; otherwise the root mean square of the axes replaces them. The mean separates processes
-/// better, but a process found in the mean only reduces the others.
+/// within the range of the axes; otherwise they are replaced by the root mean square of the axes. The mean separates
+/// processes better, but a process that is found only in the mean makes the other processes weaker.
 pub fn within(mut mean: Identified, axes: &[&Identified]) -> Identified {
     if axes.is_empty() {
         return mean;

@@ -1,4 +1,4 @@
-//! Statistics of a log as read.
+//! Statistics of a log, computed while it is read.
 
 use serde::Serialize;
 
@@ -19,7 +19,7 @@ pub struct LogFacts {
     /// Period of the time stamps relative to the stated period, minus one, if they contradict each other and
     /// the stamps were used.
     pub off_stated_period: Option<f64>,
-    /// The columns of each triad's body axes right, front, up, with values as in the file.
+    /// The columns of each triad along the body axes right, front and up, with values as in the file.
     pub columns: PerSensor<[ColumnFacts; 3]>,
     /// The columns as given in `run.toml`.
     pub named: NamedColumns,
@@ -30,19 +30,19 @@ pub struct LogFacts {
 /// The columns as given in `run.toml`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NamedColumns {
-    /// Time column, if given.
+    /// Time column, if there is one.
     pub time: Option<String>,
     /// Columns of both triads, along the axes of the file.
     pub triads: PerSensor<[FileColumn; 3]>,
-    /// Temperature column, if given.
+    /// Temperature column, if there is one.
     pub temperature: Option<String>,
     /// Axis order from the axes of the file to right-front-up.
     pub axes: AxisOrder,
 }
 
 impl NamedColumns {
-    /// The columns of both triads along right, front and up of the body, with a minus if the sign is reversed; `None` if
-    /// a triad was not recorded.
+    /// The columns of both triads along the right, front and up axes of the body, with a minus sign if the sign is
+    /// reversed; `None` if a triad was not recorded.
     pub fn along_body(&self) -> Option<PerSensor<[String; 3]>> {
         let of = |sensor: Sensor| {
             [0, 1, 2].map(|axis| {
@@ -101,7 +101,7 @@ pub struct ColumnFacts {
     pub at_largest: usize,
     /// The step of the grid on which all values lie, if there is one.
     pub step: Option<f64>,
-    /// One unit of the column per row, rad or m/s by the nominal scale.
+    /// The angle or velocity that one unit of the column in a row represents, rad or m/s, from the nominal scale.
     #[serde(skip)]
     pub unit: f64,
 }
@@ -143,7 +143,7 @@ impl ColumnFacts {
 }
 
 impl ColumnFacts {
-    /// Combines the statistics with those of the rows that follow.
+    /// Combines the statistics with those of the following rows.
     pub fn and(self, later: &Self) -> Self {
         let smallest = self.smallest.min(later.smallest);
         let largest = self.largest.max(later.largest);

@@ -1,6 +1,6 @@
-//! Recorded data: samples of the instrument, readings of the table, labelled sections, and notes of the
-//! reader. Data only; prior knowledge of the instrument, the site and the table is in [`crate::run`],
-//! estimation in [`crate::calibration`].
+//! Recorded data: samples of the instrument, readings of the table, labelled sections, and notes of the reader. This
+//! module contains only data. Prior knowledge of the instrument, the site and the table is in [`crate::run`];
+//! estimation is in [`crate::calibration`].
 
 pub mod faults;
 mod log_facts;
@@ -56,14 +56,14 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// Labels of the segments, in their order in the recording, repetitions included.
+    /// Labels of the segments in the order of the recording, including repetitions.
     pub fn labels(&self) -> Vec<String> {
         self.segments.iter().map(|s| s.label.clone()).collect()
     }
 
-    /// A recording of consecutive samples without a gap: start of the first sample, s; length of each, s;
-    /// integrals of the normalised output (see [`crate::imu::Nominal`]) over each, rad and m/s along
-    /// right-front-up.
+    /// A recording of consecutive samples without a gap. The arguments are the start of the first sample, s; the length
+    /// of each sample, s; and the integrals of the normalised output (see [`crate::imu::Nominal`]) over each sample,
+    /// rad and m/s along the right, front and up axes.
     ///
     /// # Errors [`SampleError`] if the triads differ in length, a number is not finite, or the period is not positive.
     pub fn from_samples(
@@ -77,7 +77,7 @@ impl Recording {
         Ok(Self::of(name, imu))
     }
 
-    /// Takes its name, such as `x_up`, as the label of a position.
+    /// Uses the name of the recording, such as `x_up`, as the label of its position.
     pub fn label_by_name(&mut self) {
         let (imu, label) = (&self.imu, self.name.to_lowercase());
         let axes = imu
@@ -96,7 +96,7 @@ impl Recording {
         }
     }
 
-    /// A recording of these samples alone.
+    /// A recording that contains only these samples.
     pub fn of(name: &str, imu: ImuSamples) -> Self {
         Self {
             name: name.to_owned(),

@@ -1,4 +1,4 @@
-//! Samples of both triads near the current one.
+//! Samples of both triads near the current sample.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -11,7 +11,7 @@ use crate::imu::PerSensor;
 /// Number of samples that are unpacked ahead.
 const AHEAD: usize = 1024;
 
-/// A moving window of samples of a recording; if the recording is not packed, all samples.
+/// A moving window over the samples of a recording; if the recording is not packed, the window contains all samples.
 #[derive(Debug, Clone)]
 pub struct Near<'a> {
     imu: &'a ImuSamples,

@@ -6,16 +6,16 @@ use nalgebra::Vector3;
 use thiserror::Error;
 
 use super::{Bridge, Fault, FaultKind, LogFacts, Series, Temperature};
-use crate::imu::{PerSensor, Sensor};
+use crate::imu::{Output, PerSensor, Sensor};
 
-/// The samples of both triads, at one period, in one stretch or several.
+/// The samples of both triads, with one sample period, in one or several stretches.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ImuSamples {
     /// Length of every sample, s.
     pub period: f64,
     /// Relative 1σ of the sample length; zero if a clock determines it.
     pub period_sigma: f64,
-    /// Stretches of consecutive samples, in order; at least one. Between two stretches at least one sample is
+    /// Stretches of consecutive samples, in order; there is at least one. Between two stretches at least one sample is
     /// lost.
     pub stretches: Vec<Stretch>,
     /// Whether samples are consecutive in time; otherwise they are concatenated sections, and only a labelled section
@@ -25,9 +25,9 @@ pub struct ImuSamples {
     pub gyro: Series,
     /// Integrals of the normalised accelerometer output over each sample, m/s.
     pub accel: Series,
-    /// One pulse, rad and m/s, if samples are whole pulses; zero otherwise.
+    /// Size of one pulse, rad and m/s, if samples are whole pulses; zero otherwise.
     pub pulse: PerSensor<f64>,
-    /// Faults of the file's samples, in order of kind, axis and time.
+    /// Faults of the samples in the file, in order of kind, axis and time.
     pub faults: Vec<Fault>,
     /// Interpolated samples, grouped by axes, in order of time; bridges of one axis do not
     /// overlap.
@@ -38,11 +38,11 @@ pub struct ImuSamples {
     pub log: Option<LogFacts>,
 }
 
-/// Fewest samples of a recording; with fewer, dwells and turns cannot be distinguished.
+/// Fewest samples of a recording; with fewer samples, dwells and turns cannot be distinguished.
 pub const FEWEST_SAMPLES: usize = 100;
 
 impl ImuSamples {
-    /// Whether each sample is the mean output in a position, as in a table of six means.
+    /// Whether each sample is the mean output in one position, as in a table of the mean outputs in six positions.
     pub fn is_of_means(&self) -> bool {
         !self.continuous && self.len() < FEWEST_SAMPLES
     }
@@ -63,10 +63,10 @@ pub struct Stretch {
     pub start: f64,
 }
 
-/// Invalid arrays of samples.
+/// Errors in arrays of samples.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum SampleError {
-    /// Triads with different numbers of samples.
+    /// The triads have different numbers of samples.
     #[error("{gyro} gyro samples but {accel} accelerometer samples; give one of each per period")]
     Lengths {
         /// Samples of the gyros.
@@ -77,10 +77,10 @@ pub enum SampleError {
     /// No samples.
     #[error("no samples; give the output integrated over each period")]
     Empty,
-    /// A number that is not finite.
+    /// A number is not finite.
     #[error("sample {sample} is not finite; remove it, or split the recording there")]
     NotFinite {
-        /// The first such sample.
+        /// The first sample that contains a non-finite number.
         sample: usize,
     },
     /// An invalid period.
@@ -102,10 +102,23 @@ impl ImuSamples {
         self.gyro.is_packed()
     }
 
+    /// Resolution of rates along body axes, rad/s or m/s²; zero if not rounded, or if rows are integrals, which may
+    /// carry the remainder.
+    pub fn resolution(&self, sensor: Sensor) -> Vector3<f64> {
+        // Means of positions are few, so their steps are not those of rounding.
+        let is_rounded = self.has(sensor) && !self.is_of_means();
+        let of_rates = |log: &&LogFacts| is_rounded && log.output == Output::Rate;
+        let Some(log) = self.log.as_ref().filter(of_rates) else {
+            return Vector3::zeros();
+        };
+        let columns = log.columns.get(sensor);
+        Vector3::from_fn(|axis, _| columns[axis].step_rate(self.period).unwrap_or(0.0))
+    }
+
     /// Consecutive samples without a gap; the first begins at `start`, s.
     ///
     /// # Errors
-    /// [`SampleError`], as for [`super::Recording::from_samples`].
+    /// Returns [`SampleError`], as in [`super::Recording::from_samples`].
     pub fn new(
         start: f64,
         period: f64,
@@ -136,7 +149,7 @@ impl ImuSamples {
         Ok(Self::made(start, period, gyro, accel))
     }
 
-    /// Samples of rates with another period that has this relative 1σ.
+    /// A copy of samples of rates, with another sample period that has this relative 1σ.
     pub fn with_period(mut self, period: f64, sigma: f64) -> Self {
         let longer = period / self.period;
         for triad in [&mut self.gyro, &mut self.accel] {
@@ -218,8 +231,8 @@ impl ImuSamples {
         begin..begin + samples.len() as f64 * self.period
     }
 
-    /// A time as a real number of samples from the first one. If two stretches are farther apart in time than in
-    /// samples, times after all lost samples between them map to the last lost sample.
+    /// A time as a real number of samples from the first one. If the time between two stretches is longer than the
+    /// number of lost samples explains, times after all lost samples between them are mapped to the last lost sample.
     pub fn edge(&self, time: f64) -> f64 {
         let begun = self.stretches.partition_point(|s| s.start <= time);
         let stretch = self.stretches.get(begun.saturating_sub(1));
@@ -237,7 +250,7 @@ impl ImuSamples {
         self.continuous && !self.is_lost(samples)
     }
 
-    /// Whether some of these samples are lost.
+    /// Whether any of these samples are lost.
     pub fn is_lost(&self, samples: &Range<usize>) -> bool {
         let begun = |stretch: &Stretch| stretch.samples.start <= samples.start;
         let begun = self.stretches.partition_point(begun);
@@ -254,7 +267,7 @@ impl ImuSamples {
             .filter(|missing| !missing.is_empty())
     }
 
-    /// The samples without a row in the log, interpolated or not, in order.
+    /// The samples that have no row in the log, whether interpolated or not, in order.
     pub fn lost(&self) -> Vec<Range<usize>> {
         let faults = self.faults.iter();
         let bridged = faults.filter(|fault| fault.kind == FaultKind::Missing);

@@ -10,11 +10,11 @@ use crate::units::DEGREE;
 /// A labelled section of the recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Segment {
-    /// Stamp of its first row, s.
+    /// Time stamp of the first row of the section, s.
     pub start: f64,
-    /// The first stamp after its last row, s.
+    /// The first time stamp after the last row of the section, s.
     pub end: f64,
-    /// The samples, at least one.
+    /// The samples of the section, at least one.
     pub samples: Range<usize>,
     /// `x_up` … `z_down`, `rot_x+360` and the like, or any other text.
     pub label: String,
@@ -25,12 +25,13 @@ pub struct Segment {
 /// Motion of a section according to its label.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum LabelledMotion {
-    /// `z_down`: the instrument is at rest, and this direction along right-front-up points up.
+    /// `z_down`: the instrument is at rest, and this direction, given in right-front-up axes, points up.
     Stands {
         /// Unit vector.
         up: Vector3<f64>,
     },
-    /// `rot_x-360`: the instrument is at rest, turns about this direction along right-front-up, and is at rest again.
+    /// `rot_x-360`: the instrument is at rest, turns about this direction, given in right-front-up axes, and is at rest
+    /// again.
     Turns {
         /// Unit vector.
         axis: Vector3<f64>,

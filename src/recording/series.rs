@@ -1,4 +1,4 @@
-//! Increments of a triad in sequence, packed if numerous.
+//! The sequence of increments of a triad, packed if there are many.
 
 mod packed;
 
@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 use packed::Packed;
 pub use packed::{Packer, finest_step};
 
-/// Increments of a triad along right-front-up, rad or m/s per sample.
+/// Increments of a triad along the right, front and up axes, rad or m/s per sample.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Series {
     whole: Vec<Vector3<f64>>,
@@ -32,7 +32,8 @@ impl Series {
         self.len() == 0
     }
 
-    /// Whether the increments are packed, which makes reading slower; unpacking many at once takes memory.
+    /// Whether the increments are packed. Reading packed increments is slower, and unpacking many of them at once takes
+    /// memory.
     pub fn is_packed(&self) -> bool {
         self.packed.is_some()
     }
@@ -47,7 +48,7 @@ impl Series {
         self.part(k..k + 1).first().copied().unwrap_or_default()
     }
 
-    /// A range of increments; there are fewer at the end of the recording.
+    /// A range of increments, which is shorter at the end of the recording.
     pub fn part(&self, samples: Range<usize>) -> Cow<'_, [Vector3<f64>]> {
         let end = samples.end.min(self.len());
         let samples = samples.start.min(end)..end;
@@ -113,7 +114,7 @@ impl Series {
         })
     }
 
-    /// All increments, to be modified; unpacks them.
+    /// Unpacks all increments, so that they can be modified.
     pub fn to_mut(&mut self) -> &mut Vec<Vector3<f64>> {
         if let Some(packed) = self.packed.take() {
             self.whole = packed.part(0..packed.len());
@@ -122,11 +123,11 @@ impl Series {
     }
 }
 
-/// Collects samples of the quantity that a file stores, rates or increments, plain or packed.
+/// Collects samples of the quantity in a file (rates or increments), plain or packed.
 pub enum SeriesWriter {
     /// Samples as numbers.
     Whole(Vec<Vector3<f64>>),
-    /// Samples as whole numbers of the finest step.
+    /// The samples are stored as whole numbers of the finest step.
     Packed(Packer),
 }
 

@@ -30,8 +30,8 @@ struct Channel {
 }
 
 impl Temperature {
-    /// Temperatures from means over consecutive spans of [`SPACING`], the first centred on `start`, °C; `of` is
-    /// the index of the sensor of each axis. `None` without values, or if an axis has no sensor.
+    /// Temperatures in °C from means over consecutive spans of [`SPACING`], the first of which is centred on `start`;
+    /// `of` is the index of the sensor for each axis. `None` if there are no values, or if an axis has no sensor.
     pub fn new(start: f64, channels: Vec<Vec<f64>>, of: PerSensor<[usize; 3]>) -> Option<Self> {
         let has_values = |values: &Vec<f64>| !values.is_empty();
         let known = |&channel: &usize| channels.get(channel).is_some_and(has_values);
@@ -59,12 +59,12 @@ impl Temperature {
         self.of_axes(time, |channel| &channel.values)
     }
 
-    /// Rate of each axis at a time, K/s.
+    /// Temperature rate of each axis at a time, K/s.
     pub fn rate(&self, time: f64) -> PerSensor<[f64; 3]> {
         self.of_axes(time, |channel| &channel.rates)
     }
 
-    /// Temperature range of some recordings; its middle is the reference of parameters.
+    /// Temperature range of some recordings, whose middle is the reference temperature of the parameters.
     pub fn seen<'a>(all: impl Iterator<Item = &'a Self> + Clone) -> PerSensor<ThermalRange> {
         PerSensor::from_fn(|sensor| {
             let (mut lowest, mut highest) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -88,7 +88,7 @@ impl Temperature {
         self.extremes(sensor, |channel| &channel.values)
     }
 
-    /// The largest magnitude of the rate of a triad's axes, K/s.
+    /// The largest magnitude of the temperature rate on the axes of a triad, K/s.
     pub fn largest_rate(&self, sensor: Sensor) -> f64 {
         let [lowest, highest] = self.extremes(sensor, |channel| &channel.rates);
         highest.max(-lowest)

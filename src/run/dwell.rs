@@ -1,4 +1,4 @@
-//! A dwell: samples during which the instrument is at rest, with the output of sensors and table.
+//! A dwell, during which the instrument is at rest, with the outputs of the sensors and the table.
 
 use std::ops::Range;
 
@@ -84,7 +84,7 @@ impl Dwell {
         self.mean(Sensor::Accel, run).output - run.instrument.prior.accel.bias
     }
 
-    /// The first part of the dwell; the attitude remains the mean of all its readings.
+    /// Returns the first part of the dwell; the attitude remains the mean of all readings in the dwell.
     pub fn first_part(&self, part: f64, imu: &ImuSamples) -> Self {
         let samples = (part * self.duration(imu) / imu.period).round() as usize;
         let end = self.samples.end.min(self.samples.start + samples);
@@ -107,7 +107,7 @@ impl Dwell {
     }
 }
 
-/// The samples that two ranges have in common; an empty range if none.
+/// The samples that two ranges have in common; an empty range if there are none.
 pub fn common(one: &Range<usize>, other: &Range<usize>) -> Range<usize> {
     one.start.max(other.start)..one.end.min(other.end)
 }

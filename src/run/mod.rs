@@ -1,7 +1,7 @@
 //! A run: one recording, with prior knowledge of the instrument, the site and the table.
 //!
-//! Everything is in SI, on right-front-up body axes and in normalised outputs (see [`crate::imu::Nominal`]);
-//! `turncal-files` converts the units and axes of files.
+//! All quantities are in SI units, along right-front-up body axes and in normalised outputs (see
+//! [`crate::imu::Nominal`]); `turncal-files` converts the units and axes of files.
 
 mod doubts;
 mod dwell;
@@ -33,7 +33,7 @@ pub struct Run {
     pub instrument: Instrument,
     /// Site of the turntable.
     pub site: Site,
-    /// Accuracy of the table readings; no effect if there are none.
+    /// Accuracy of the table readings; it has no effect if there are no readings.
     pub table: TableAccuracy,
     /// Motion of the IMU while the table is at rest.
     pub standstill: Standstill,
@@ -75,7 +75,7 @@ impl Run {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Aiding {
-    /// Zero velocity in every dwell, and table attitude
+    /// Zero velocity in every dwell, and the attitude of the table
     Table,
     /// Zero velocity only; the accelerometers define the body axes
     Velocity,
@@ -99,8 +99,8 @@ pub struct Standstill {
     pub sigma: PerSensor<Option<f64>>,
     /// Unwanted rotation of the body at rest, if no table is observed: 1σ density of a random walk, rad/√s.
     pub turning: f64,
-    /// 1σ of the IMU's position while the table is at rest, m. It must be at least the distance of the IMU from the
-    /// table centre, because the IMU moves that far between positions.
+    /// 1σ of the position of the IMU while the table is at rest, m. This σ must be at least the distance of the IMU
+    /// from the table centre, because the IMU moves that far between positions.
     pub position_sigma: f64,
 }
 

@@ -1,4 +1,4 @@
-//! The table's clock on that of the IMU: offset and drift, from the moves that both logs show.
+//! Conversion of the table clock to the IMU clock, with the offset and drift that follow from the moves in both logs.
 
 use super::Run;
 use super::doubts::clock::{Move, moves, resolved};
@@ -48,8 +48,9 @@ impl Line {
 }
 
 impl Run {
-    /// Puts the readings of the table at the times of the IMU where all moves agree in an offset and a drift of its
-    /// clock, and says so. Which of the clocks drifts is unknown: the drift counts as an error of the sample period.
+    /// If all moves are consistent with one offset and one drift of the table clock, converts the times of the table
+    /// readings to the IMU clock, and returns a note about this conversion. It is unknown which of the two clocks
+    /// drifts, so the drift is treated as an error of the sample period.
     pub fn align_table(&mut self) -> Option<String> {
         let table = self.recording.table.as_ref()?;
         if agree(self, &moves(self, table)) {
@@ -79,14 +80,16 @@ impl Line {
         let drift = match self.drift {
             [0.0, _] => String::new(),
             [drift, sigma] => format!(
-                ", and the clocks drift apart by {:.1} ± {:.1} ppm, which is in the σ of the gyro scale factors",
+                ", and the clocks drift apart by {:.1} ± {:.1} ppm, which is included in the σ of the gyro scale \
+                 factors",
                 drift / PPM,
                 sigma / PPM
             ),
         };
         format!(
-            "The gyros turn {:.3} ± {:.3} s {way} than the table in all {moves} moves{drift}. turncal put the table log on \
-             the clock of the IMU. Convert both logs to the same clock to avoid this.",
+            "In all {moves} moves, the gyros turn {:.3} ± {:.3} s {way} than the table{drift}. turncal converted the \
+             times of the table log to the clock of the IMU. To avoid this conversion, use the same clock in both \
+             logs.",
             offset.abs(),
             self.offset[1],
         )

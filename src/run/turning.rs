@@ -1,4 +1,4 @@
-//! Criteria for a turn of the gyros, and for its disagreement with a label or the table.
+//! Criteria for a turn sensed by the gyros, and for its disagreement with a label or the table.
 
 use std::ops::Range;
 
@@ -23,8 +23,8 @@ pub fn tolerance(run: &Run) -> f64 {
     OTHER_ANGLE.max(SCALE_SIGMAS * run.instrument.prior.gyro.scale_sigma.amax())
 }
 
-/// The steps of some samples: time of the middle and duration, s, and turn, rad. `zero` is the gyros' output at rest,
-/// rad/s.
+/// Divides samples into steps, each with the time of its middle, s, its duration, s, and its turn, rad. `zero` is the
+/// gyro output at rest, rad/s.
 pub fn steps(
     imu: &ImuSamples,
     samples: Range<usize>,

@@ -21,7 +21,7 @@ pub struct SimulatedCampaign {
     pub name: String,
     /// The scenario common to all recordings.
     pub scenario: Scenario,
-    /// Name of each recording, and its chamber, if any.
+    /// Name of each recording, and its climatic chamber, if any.
     pub recordings: Vec<(String, Option<Chamber>)>,
     /// σ of the differences between recordings.
     pub day_to_day: DayToDay,
@@ -31,7 +31,8 @@ pub struct SimulatedCampaign {
 const STREAMS: u64 = 1 << 10;
 
 impl SimulatedCampaign {
-    /// Whether the name is that of a campaign: a file that lists recordings, otherwise an embedded campaign.
+    /// Whether the name refers to a campaign: a file that lists recordings or, if there is no such file, an embedded
+    /// campaign.
     pub fn is_named(name_or_path: &str) -> bool {
         match models::text(Room::Campaign, name_or_path, &Place::CommandLine) {
             Ok(text) if text.place == Place::Embedded => true,
@@ -43,7 +44,7 @@ impl SimulatedCampaign {
     /// Finds and reads a campaign, by embedded name or path, with the models that it refers to.
     ///
     /// # Errors
-    /// If one of them does not exist or is malformed.
+    /// Returns an error if one of these files does not exist or is malformed.
     pub fn load(name_or_path: &str) -> Result<Self, ModelError> {
         let text = models::text(Room::Campaign, name_or_path, &Place::CommandLine)?;
         let file: CampaignFile = text.parse()?;
@@ -85,7 +86,7 @@ impl SimulatedCampaign {
     /// keeps the seed and increments the stream.
     ///
     /// # Errors
-    /// If the table cannot follow the path.
+    /// Returns an error if the table cannot follow the path.
     pub fn simulate(&self, seed: u64, stream: u64) -> Result<Vec<Simulated>, TableError> {
         let all = (0..).zip(&self.recordings);
         all.map(|(number, (name, chamber))| {

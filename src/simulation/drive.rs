@@ -1,4 +1,4 @@
-//! One drive of a table along its path: the common part of runs that differ only in random numbers.
+//! One drive of a table along its path, which is the common part of runs that differ only in random numbers.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -13,7 +13,7 @@ pub struct Drive {
     terms: TermVector,
     /// Duration, s.
     pub duration: f64,
-    /// Integrals over each sample: see [`true_increments`].
+    /// Integrals over each sample; see [`true_increments`].
     pub ideal: PerSensor<Vec<Vector3<f64>>>,
     /// Time, position number and attitude of a perfect table at each reading.
     pub read: Vec<(f64, usize, Matrix3<f64>)>,
@@ -45,7 +45,7 @@ impl Drive {
         })
     }
 
-    /// Whether the drive has this imperfection and these error terms.
+    /// Whether the drive was computed with these imperfections and these error terms.
     pub fn is_of(&self, imperfection: &Imperfection, terms: &TermVector) -> bool {
         (&self.imperfection, &self.terms) == (imperfection, terms)
     }

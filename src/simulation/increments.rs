@@ -1,4 +1,4 @@
-//! Input sensed by an ideal IMU on a moving table: exact integrals, with steps finer than its samples.
+//! Input sensed by an ideal IMU on a moving table, computed as exact integrals in steps finer than the samples.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -14,7 +14,7 @@ pub struct Integrator {
     pub period: f64,
     /// Lever arm from the table's centre, where its axes meet, to the IMU, along body axes, m.
     pub lever_arm: Vector3<f64>,
-    /// Number of steps in a sample, each with two Gauss–Legendre points.
+    /// Number of integration steps in a sample, each with two Gauss–Legendre points.
     pub steps: u32,
 }
 
@@ -22,8 +22,8 @@ pub struct Integrator {
 ///
 /// `ω_ib = ω_nb + C_n_b ω_ie`, `f = −C_n_b g + ω̇_ib × r + ω_ib × (ω_ib × r)`, with r the lever arm.
 ///
-/// to which the instrument's error terms with these parameters are added. While the table is at rest, both are
-/// constant and computed once.
+/// to which the instrument's error terms with these parameters are added. While the table is at rest, both quantities
+/// are constant and are computed only once.
 pub fn true_increments(
     motion: &Motion,
     site: &Site,

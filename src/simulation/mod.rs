@@ -1,7 +1,7 @@
 //! Simulated runs with known truth: an instrument on a table that follows a path.
 //!
-//! Everything happens in memory. Truth, noise, the table's imperfections, its position errors and its readings draw
-//! from separate generators, so that a change of one does not affect the others.
+//! Simulations run entirely in memory. The truth, the noise, and the imperfections, position errors and readings of the
+//! table use separate random generators, so that a change of one does not affect the others.
 
 mod campaign;
 mod draw;
@@ -46,9 +46,9 @@ use crate::turntable::{Imperfection, Motion, Moves, TableError};
 /// A run with its truth.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Simulated {
-    /// The run as a laboratory would have recorded it.
+    /// The run, in the form in which a laboratory would record it.
     pub run: Run,
-    /// The instrument's true parameters; if they depend on temperature, those at the reference of
+    /// The instrument's true parameters; if they depend on temperature, the values at the reference of
     /// [`Self::thermal`].
     pub truth: PerSensor<Triad>,
     /// True parameters without the deviations of this recording.
@@ -57,7 +57,7 @@ pub struct Simulated {
     pub terms: TermVector,
     /// The table's true geometry, in the order of [`crate::turntable::TableGeometry::vector`], rad.
     pub geometry: SVector<f64, TABLE_GEOMETRY>,
-    /// Temperature dependence of the true parameters, if any.
+    /// Temperature dependence of the true parameters, if they depend on temperature.
     pub thermal: Option<ThermalTruth>,
     /// The true magnetometer and the magnitude of the field in T, if any.
     pub magnetic: Option<(MagneticTriad, f64)>,
@@ -149,16 +149,16 @@ impl Scenario {
     /// and increments the stream.
     ///
     /// # Errors
-    /// If the table cannot follow the path.
+    /// Returns an error if the table cannot follow the path.
     pub fn simulate(&self, seed: u64, stream: u64) -> Result<Simulated, TableError> {
         self.simulate_recording(seed, stream, stream, &Difference::default())
     }
 
-    /// Simulates one recording of the instrument of one stream, with all other random numbers from another stream and
-    /// with parameter differences `own`.
+    /// Simulates one recording. The instrument is drawn from one random stream and all other random numbers from
+    /// another stream; `own` contains the differences of the parameters in this recording.
     ///
     /// # Errors
-    /// If the table cannot follow the path.
+    /// Returns an error if the table cannot follow the path.
     pub fn simulate_recording(
         &self,
         seed: u64,

@@ -6,7 +6,7 @@ use crate::calibration::Difference;
 use crate::imu::TermVector;
 use crate::turntable::{Imperfection, TableError};
 
-/// Many runs of a scenario. With a perfect table, all of them share one drive, which is computed once.
+/// Many runs of a scenario. With a perfect table, all runs share one drive, which is computed once.
 #[derive(Debug, Clone)]
 pub struct Runs {
     scenario: Scenario,
@@ -17,7 +17,7 @@ impl Runs {
     /// The runs of a scenario.
     ///
     /// # Errors
-    /// If the table cannot follow the path.
+    /// Returns an error if the table cannot follow the path.
     pub fn new(scenario: &Scenario) -> Result<Self, TableError> {
         let none = Imperfection::none(&scenario.table);
         Ok(Self {
@@ -29,7 +29,7 @@ impl Runs {
     /// Simulates one run, as [`Scenario::simulate`] does.
     ///
     /// # Errors
-    /// If the table cannot follow the path.
+    /// Returns an error if the table cannot follow the path.
     pub fn simulate(&self, seed: u64, stream: u64) -> Result<Simulated, TableError> {
         let own = Difference::default();
         let shared = Some(&self.perfect);

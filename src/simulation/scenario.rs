@@ -35,10 +35,9 @@ pub struct Scenario {
     pub instrument: Instrument,
     /// Misalignment form, with the distribution of its angles.
     pub installation: InstallationModel,
-    /// The true body frame: in the accelerometer frame, the misalignment angles that it
-    /// fixes are not drawn.
+    /// The true body frame: in the accelerometer frame, the misalignment angles that this frame fixes are not drawn.
     pub body_frame: BodyFrame,
-    /// True values that are stated instead of drawn.
+    /// True values that are stated instead of being drawn at random.
     pub given: PerSensor<Given>,
     /// The table.
     pub table: Table,
@@ -50,11 +49,11 @@ pub struct Scenario {
     pub path_name: String,
     /// Quantity of a sample.
     pub output: Output,
-    /// Sample period, lever arm and step of the truth.
+    /// Sample period, lever arm and integration step of the truth.
     pub integrator: Integrator,
     /// Readings of the table per second.
     pub reading_rate: f64,
-    /// The climatic chamber of the instrument; `None` for a constant temperature.
+    /// The climatic chamber in which the instrument is; `None` for a constant temperature.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chamber: Option<Chamber>,
     /// The magnetometer of the instrument, and the field at the site; `None` without one.
@@ -64,7 +63,8 @@ pub struct Scenario {
     pub seed: u64,
 }
 
-/// True values of a triad stated in a scenario; the others are drawn. The prior remains that of the grade.
+/// True values of a triad that a scenario states; other values are drawn at random. The prior is still the prior for
+/// the grade.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Given {
     /// Scale factors − 1.
@@ -79,7 +79,7 @@ impl Scenario {
     /// Finds and reads a scenario, by embedded name or path, and the models that it refers to.
     ///
     /// # Errors
-    /// If one of them does not exist or is malformed, or they do not fit together.
+    /// Returns an error if one of the files does not exist or is malformed, or the files are not consistent.
     pub fn load(name_or_path: &str) -> Result<Self, ModelError> {
         let text = models::text(Room::Scenario, name_or_path, &Place::CommandLine)?;
         let file: ScenarioFile = text.parse()?;
@@ -129,7 +129,7 @@ impl Scenario {
     /// A copy with a different path, given by embedded name or file.
     ///
     /// # Errors
-    /// If it does not exist, is malformed, or does not fit the table.
+    /// Returns an error if the path does not exist, is malformed, or does not fit the table.
     pub fn with_path(self, name_or_path: &str) -> Result<Self, ModelError> {
         let (path, name) = models::path(name_or_path, &Place::CommandLine, &self.site)?;
         let along = self.along(path, &name);
@@ -139,7 +139,7 @@ impl Scenario {
     /// A copy along a path of this name.
     ///
     /// # Errors
-    /// A message if it does not fit the table, or takes too many samples.
+    /// A message if the path does not fit the table or needs too many samples.
     pub fn along(self, path: Path, path_name: &str) -> Result<Self, String> {
         let scenario = Self {
             path,
@@ -150,7 +150,7 @@ impl Scenario {
         Ok(scenario)
     }
 
-    /// A copy with an error term, of usual magnitude unless its models state one.
+    /// A copy with an error term, which has the usual magnitude unless the models state one.
     pub fn with_error_term(mut self, block: ErrorTerm) -> Self {
         match block {
             ErrorTerm::GaussMarkovBias => {
@@ -210,7 +210,7 @@ impl Scenario {
     /// Motion of a perfect table along the path.
     ///
     /// # Errors
-    /// If the table cannot follow the path.
+    /// Returns an error if the table cannot follow the path.
     pub fn motion(&self) -> Result<Motion, TableError> {
         Motion::new(&self.table, &self.path, &Imperfection::none(&self.table))
     }
@@ -218,7 +218,7 @@ impl Scenario {
     /// Duration of a run, s.
     ///
     /// # Errors
-    /// If the table cannot follow the path.
+    /// Returns an error if the table cannot follow the path.
     pub fn duration(&self) -> Result<f64, TableError> {
         Ok(self.motion()?.duration())
     }
@@ -226,7 +226,7 @@ impl Scenario {
     /// Total time of the dwells in a run, s.
     ///
     /// # Errors
-    /// If the table cannot follow the path.
+    /// Returns an error if the table cannot follow the path.
     pub fn standing_time(&self) -> Result<f64, TableError> {
         let motion = self.motion()?;
         Ok(motion.dwells().map(|(start, end)| end - start).sum())
@@ -246,7 +246,7 @@ impl Scenario {
             let number = duration * rate;
             if !(2.0..=MOST_SAMPLES).contains(&number) {
                 return Err(format!(
-                    "{duration:.1} s of path {} at {rate} Hz give {number:.3e} {what}; expected 2 to \
+                    "{duration:.1} s of path {} at {rate} Hz require {number:.3e} {what}, expected 2 to \
                      {MOST_SAMPLES:.0e}",
                     self.path_name
                 ));

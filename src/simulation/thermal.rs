@@ -1,4 +1,4 @@
-//! An instrument in a climatic chamber: its temperature against time, and its true parameters.
+//! An instrument in a climatic chamber: its temperature as a function of time, and its true parameters.
 
 use nalgebra::SVector;
 use rand_chacha::ChaCha8Rng;
@@ -15,12 +15,12 @@ use crate::recording::{TEMPERATURE_SPACING, Temperature};
 /// A climatic chamber, with the thermal response of the instrument.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Chamber {
-    /// Time in s and temperature of the chamber in °C. Linear between points, constant before the first and after the
-    /// last. The instrument starts soaked at the first.
+    /// Time in s and temperature of the chamber in °C. The temperature is linear between points, and constant before
+    /// the first and after the last point. The instrument starts soaked at the first temperature.
     pub profile: Vec<(f64, f64)>,
-    /// Time constant of the instrument in the chamber, s; with zero, it follows at once.
+    /// Time constant of the instrument in the chamber, s; with zero, the instrument follows the chamber at once.
     pub time_constant: f64,
-    /// White noise of one-second means of its temperature sensor, K.
+    /// White noise of one-second means from the temperature sensor, K.
     pub sensor_noise: f64,
 }
 
@@ -69,7 +69,7 @@ impl Chamber {
     }
 }
 
-/// Temperature of an instrument every second.
+/// Temperature of an instrument at intervals of one second.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Warming {
     values: Vec<f64>,
@@ -135,7 +135,7 @@ impl ThermalTruth {
         by[0] * t + by[1] * (t * t) + by[2] * rate
     }
 
-    /// Both triads at a temperature, given those at the reference.
+    /// Both triads at a temperature, given the triads at the reference temperature.
     pub fn at(&self, triads: &PerSensor<Triad>, temperature: f64, rate: f64) -> PerSensor<Triad> {
         PerSensor::from_fn(|sensor| {
             let triad = triads.get(sensor);
@@ -144,7 +144,7 @@ impl ThermalTruth {
         })
     }
 
-    /// Re-expands the polynomials over another range; exact for polynomials of the same order.
+    /// Re-expands the polynomials over another range, which is exact for polynomials of the same order.
     pub fn coefficients(&self, range: &PerSensor<ThermalRange>) -> PerSensor<ThermalCoefficients> {
         PerSensor::from_fn(|sensor| {
             let (range, by) = (range.get(sensor), self.by.get(sensor));

@@ -1,7 +1,7 @@
 //! Accuracy of the filter and consistency of its σ over many simulated runs, compared with the truth, the Cramér–Rao
 //! bound, and the closed form on the static positions of the paper.
 //!
-//! Everything is compared in the general form and in the body frame of the table.
+//! All values are compared in the general form and in the body frame of the table.
 
 mod baseline;
 mod configuration;
@@ -34,7 +34,8 @@ pub struct Accuracy {
     pub table_time: f64,
     /// Every run, in order.
     pub trials: Vec<Trial>,
-    /// Figures of each group that has a parameter to estimate, RMS over its parameters, in rad/s, m/s² or pure numbers.
+    /// Figures for each group with at least one estimated parameter, RMS over its parameters, in rad/s, m/s² or pure
+    /// numbers.
     pub groups: Vec<(Group, Figures)>,
     /// Navigation accuracy of the calibrations in each mission.
     pub navigation: Vec<NavigationAccuracy>,
@@ -44,7 +45,7 @@ pub struct Accuracy {
     pub anees: Option<Anees>,
     /// Figures of each error term that was estimated, RMS over its parameters, in rad or SI.
     pub error_terms: Vec<(ErrorTerm, Figures)>,
-    /// Evidence for each error term in the first run.
+    /// Evidence for each error term, from the first run.
     pub effects: Vec<TermEvidence>,
     /// NIS of zero velocity over all runs.
     pub velocity: Nis,
@@ -57,7 +58,7 @@ pub struct Accuracy {
 pub struct Anees {
     /// The average.
     pub mean: f64,
-    /// n, the number of directions of one run that have a σ.
+    /// n, the number of directions with a σ in one run.
     pub directions: usize,
     /// 95 % interval of the average if the σ are correct (χ²).
     pub interval_95: (f64, f64),
@@ -109,7 +110,7 @@ impl Study for AccuracyStudy {
 }
 
 impl Accuracy {
-    /// Results of the filter in the runs in which it did not fail.
+    /// Results of the filter in the runs in which the filter did not fail.
     pub fn filtered(&self) -> impl Iterator<Item = &Filtered> {
         filtered(&self.trials)
     }
@@ -119,7 +120,7 @@ impl Accuracy {
         (self.study.form, self.study.scenario.installation.form)
     }
 
-    /// NIS over all runs for each kind of observation made.
+    /// NIS over all runs, for each kind of observation that was used.
     pub fn nis(&self) -> impl Iterator<Item = (&'static str, &Nis)> {
         let kinds = [
             ("zero velocity", &self.velocity),

@@ -1,4 +1,5 @@
-//! A calibration with its checks, and its consequences: accuracy predicted for the recording, and navigation errors.
+//! A calibration with its checks, the accuracy predicted for the recording, and the navigation errors that result from
+//! the calibration.
 
 use super::navigation::{MethodOutlook, NavigationStudyError, navigate_with_each};
 use crate::calibration::{Assessment, Calibration, CalibrationError, Problem, Solution};
@@ -13,7 +14,7 @@ pub struct CheckedCalibration {
     pub solution: Solution,
     /// Checks.
     pub assessment: Assessment,
-    /// The calibration to write.
+    /// The calibration that is written to a file.
     pub calibration: Calibration,
 }
 
@@ -30,7 +31,7 @@ impl CheckedCalibration {
     /// Checks a solution.
     ///
     /// # Errors
-    /// [`CalibrationError`] if the problem is not the one of the solution.
+    /// Returns [`CalibrationError`] if the solution belongs to a different problem.
     pub fn new(problem: &Problem, solution: Solution) -> Result<Self, CalibrationError> {
         let assessment = solution.assess(problem)?;
         let calibration = solution.calibration(problem, &assessment);
@@ -41,7 +42,7 @@ impl CheckedCalibration {
         })
     }
 
-    /// Consequences of the calibration of this problem. The truth may be unknown.
+    /// Computes the consequences of the calibration of this problem; the truth may be unknown.
     pub fn consequences(
         &self,
         problem: &Problem,

@@ -51,11 +51,11 @@ pub struct ExperimentStudy {
 /// Situation in which an instrument navigates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Situation {
-    /// Stationary and level, heading North, self-aligned.
+    /// The instrument is stationary and level, heads north, and aligns itself.
     SelfAligned,
-    /// Stationary and level, heading North, with given attitude.
+    /// The instrument is stationary and level, heads north, and its attitude is given.
     Aligned,
-    /// Moving along the trajectory, with given initial attitude.
+    /// The instrument moves along the trajectory, and its initial attitude is given.
     Moving,
 }
 
@@ -84,7 +84,7 @@ pub struct Navigated {
     pub situation: Situation,
     /// Results of each of [`Method::all`].
     pub methods: Vec<Worth>,
-    /// Horizontal position error at the end in nmile due to the noise of alignment and navigation alone, the
+    /// Horizontal position error at the end in nmile, caused only by the noise of alignment and navigation; it is the
     /// same after every calibration.
     pub noise: Spread,
 }
@@ -94,18 +94,18 @@ pub struct Navigated {
 pub struct Worth {
     /// The method.
     pub method: Method,
-    /// Errors at the end, in the order of the instruments that have a calibration.
+    /// Errors at the end, for all instruments that have a calibration, in the order of the instruments.
     pub errors: Vec<f64>,
     /// Distribution of the errors at the end.
     pub at_end: Spread,
     /// 99 % bootstrap interval of the median at the end.
     pub median_interval: (f64, f64),
-    /// Maximum error over all minutes.
+    /// Maximum error over time, sampled every minute.
     pub largest: Spread,
     /// Errors at the end due to the errors of one triad alone.
     pub by_one: PerSensor<Spread>,
-    /// Final median of the closed form in the same misalignment form, divided by that of this method; `None` for the
-    /// closed form.
+    /// Final median of the closed form in the same misalignment form, divided by the final median of this method;
+    /// `None` for the closed form.
     pub gain: Option<Ratio>,
     /// Budget of the final error from the stated covariance.
     pub budget: Budget,

@@ -2,6 +2,8 @@
 
 pub mod accuracy;
 mod checked;
+pub mod design;
+
 pub mod experiment;
 pub mod navigation;
 pub mod path;
@@ -31,8 +33,8 @@ pub type Done<'a> = &'a (dyn Fn() -> ControlFlow<()> + Sync);
 /// A callback that does nothing.
 pub const UNWATCHED: Done<'static> = &|| ControlFlow::Continue(());
 
-/// A study of numbered runs, each with its own random streams: its result depends neither on the number of cores nor on
-/// a division into parts.
+/// A study of numbered runs, each with its own random streams, so that the result depends neither on the number of
+/// cores nor on a division into parts.
 pub trait Study: Sync {
     /// Result of one run.
     type Trial: Send;
@@ -50,7 +52,7 @@ pub trait Study: Sync {
     /// The outcome of all runs, in the order of their numbers.
     ///
     /// # Errors
-    /// [`StudyError`] if they cannot be evaluated.
+    /// Returns [`StudyError`] if the runs cannot be evaluated.
     fn outcome(&self, trials: Vec<Self::Trial>) -> Result<Self::Outcome, StudyError>;
 
     /// Performs some of the runs on all cores; `done` is called after each and may stop the study.
@@ -72,7 +74,7 @@ pub trait Study: Sync {
     /// Performs the whole study.
     ///
     /// # Errors
-    /// As [`Self::trials`] and [`Self::outcome`].
+    /// The errors of [`Self::trials`] and [`Self::outcome`].
     fn run(&self, done: Done) -> Result<Self::Outcome, StudyError> {
         let all: Vec<u64> = (0..self.runs()).collect();
         self.outcome(self.trials(&all, done)?)
@@ -99,7 +101,7 @@ pub enum StudyError {
         /// The cause.
         source: CalibrationError,
     },
-    /// Stopped by its callback.
+    /// The callback stopped the study.
     #[error("the study was stopped before its end")]
     Stopped,
 }

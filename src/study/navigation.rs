@@ -28,7 +28,7 @@ pub use quantity::Quantity;
 
 /// Time in s between two moments of a result.
 pub const INTERVAL: f64 = 60.0;
-/// Intervals in the 40 h of the paper's study.
+/// Number of intervals in the 40 h of the paper's study.
 pub const FORTY_HOURS: u32 = 40 * 60;
 /// Motion of a navigating body.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,7 +55,7 @@ impl Motion {
     /// of the trajectory.
     ///
     /// # Errors
-    /// [`ModelError`] if it cannot be read.
+    /// Returns [`ModelError`] if the trajectory cannot be read.
     pub fn along(
         name: &str,
         latitude: Option<f64>,
@@ -72,7 +72,7 @@ impl Motion {
     }
 }
 
-/// Motion and duration of navigation, from perfect alignment, with the height held to the true height.
+/// Motion and duration of navigation, starting from perfect alignment, with the height fixed to the true height.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mission {
     /// Motion of the body.
@@ -99,23 +99,23 @@ pub struct Pair {
 pub struct Exposure {
     /// Time since the start, s.
     pub time: f64,
-    /// Errors, in the order of [`NavigationError::to_vector`], per parameter error, true − estimated.
+    /// Errors for a unit parameter error (true − estimated), in the order of [`NavigationError::to_vector`].
     pub by_parameter: SMatrix<f64, STATES, PARAMETERS>,
 }
 
-/// Errors in computing the navigation error of a calibration.
+/// Reasons why the navigation error of a calibration cannot be computed.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum NavigationStudyError {
     /// East-North-Up is singular at the poles.
     #[error(transparent)]
     NearPole(#[from] NearPole),
-    /// A calibration that cannot be inverted.
+    /// The calibration cannot be inverted.
     #[error("the sensitivity matrix K·C of the {} is singular: this calibration cannot be used for navigation", .sensor.name())]
     Singular {
         /// The triad.
         sensor: Sensor,
     },
-    /// Roll and heading are not distinguishable.
+    /// Roll and heading cannot be distinguished.
     #[error(
         "at a pitch of ±90°, roll and heading cannot be distinguished: give a pitch within ±89°"
     )]
@@ -123,11 +123,11 @@ pub enum NavigationStudyError {
 }
 
 impl Pair {
-    /// A pair from records, converted to the general form and a common body frame; also returns this frame. The truth
-    /// may be a calibration with its own σ.
+    /// Makes a pair from two records, converted to the general form and a common body frame; also returns this frame.
+    /// The truth may be a calibration with its own σ.
     ///
     /// # Errors
-    /// If the records cannot be compared.
+    /// An error if the records cannot be compared.
     pub fn of_records(
         calibration: Named,
         truth: Named,
@@ -143,7 +143,7 @@ impl Pair {
         Ok((pair, calibration.body_frame))
     }
 
-    /// A copy with the errors of one triad only; the other is calibrated perfectly.
+    /// A copy with the errors of one triad only; the other triad is perfectly calibrated.
     pub fn with_errors_of(mut self, only: Sensor) -> Self {
         for sensor in Sensor::ALL.into_iter().filter(|&sensor| sensor != only) {
             *self.calibration.get_mut(sensor) = *self.truth.get(sensor);
@@ -192,7 +192,7 @@ fn input_errors(sensed: &PerSensor<Sensed>, at: &Instant) -> InputError {
 }
 
 impl Mission {
-    /// Stationary and level at a site, heading North.
+    /// A mission in which the body is stationary and level at a site and heads north.
     pub fn standing_level(site: &Site, intervals: u32) -> Self {
         Self {
             motion: Motion::Standing(Solution {
@@ -212,10 +212,10 @@ impl Mission {
         *Course::new(&self.motion).here()
     }
 
-    /// Navigates: errors and their predicted covariance at the start and after each interval.
+    /// Navigates and returns the errors and their predicted covariance at the start and after each interval.
     ///
     /// # Errors
-    /// If the mission leads to a pole or the calibration is singular.
+    /// Returns an error if the mission leads to a pole or the calibration is singular.
     pub fn navigate(&self, pair: &Pair) -> Result<Vec<Outlook>, NavigationStudyError> {
         let mut moments = self.errors(pair)?;
         if let Some(covariance) = &pair.covariance {
@@ -226,18 +226,18 @@ impl Mission {
         Ok(moments)
     }
 
-    /// Navigation errors without σ, from their nonlinear equations: takes milliseconds for 40 h at rest.
+    /// Navigation errors without σ, from the nonlinear equations; the calculation takes milliseconds for 40 h at rest.
     ///
     /// # Errors
-    /// As for [`Self::navigate`].
+    /// The errors of [`Self::navigate`].
     pub fn errors(&self, pair: &Pair) -> Result<Vec<Outlook>, NavigationStudyError> {
         self.errors_from(&ErrorVector::zeros(), pair)
     }
 
-    /// Does the same as [`Self::errors`], from a start with these errors.
+    /// Does the same as [`Self::errors`], but navigation starts with these errors.
     ///
     /// # Errors
-    /// As for [`Self::navigate`].
+    /// The same errors as [`Self::navigate`].
     pub fn errors_from(
         &self,
         start: &ErrorVector,
@@ -263,11 +263,11 @@ impl Mission {
         Ok(moments)
     }
 
-    /// Sensitivity to each parameter, by the linear model, at the start and after each interval. The sensitivity
+    /// Sensitivity to each parameter at the start and after each interval, from the linear model. The sensitivity
     /// depends so little on the instrument that one result serves for a whole grade.
     ///
     /// # Errors
-    /// As for [`Self::navigate`].
+    /// The same errors as [`Self::navigate`].
     pub fn exposure(
         &self,
         truth: &PerSensor<Triad>,
@@ -278,7 +278,7 @@ impl Mission {
     /// Does the same as [`Self::exposure`], if the initial errors also depend on the parameters.
     ///
     /// # Errors
-    /// As for [`Self::navigate`].
+    /// The same errors as [`Self::navigate`].
     pub fn exposure_from(
         &self,
         mut sensitivity: Sensitivity,
@@ -330,7 +330,7 @@ impl Mission {
 }
 
 impl Exposure {
-    /// Horizontal position error, east and north in m, per parameter error, true − estimated.
+    /// Horizontal position error, east and north in m, for a unit parameter error, true − estimated.
     pub fn position(&self) -> SMatrix<f64, 2, PARAMETERS> {
         self.by_parameter.fixed_rows::<2>(6).into_owned()
     }

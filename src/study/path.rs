@@ -1,4 +1,4 @@
-//! Predicted accuracy of a path, before any data exist: σ from the covariance of a recording along it.
+//! Predicted accuracy of a path before any data exist, from the covariance of a recording along this path.
 
 use super::navigation::{Mission, NavigationStudyError, Outlook};
 use crate::calibration::{
@@ -16,7 +16,7 @@ use crate::turntable::TableError;
 /// A path to evaluate.
 #[derive(Debug, Clone)]
 pub struct PathStudy {
-    /// The path with instrument, table and site.
+    /// The path, with the instrument, table and site.
     pub scenario: Scenario,
     /// Whether the sensor is turned by hand, without a table.
     pub by_hand: bool,
@@ -29,13 +29,15 @@ pub struct PathStudy {
 pub struct Named<'a> {
     /// The path: a TOML file, an embedded name, or a list of moves by hand.
     pub path: &'a str,
-    /// The scenario; `None` for the usual one.
+    /// The scenario; `None` for the default scenario.
     pub scenario: Option<&'a str>,
-    /// Instrument in place of the scenario's.
+    /// Instrument that replaces the instrument of the scenario.
     pub imu: Option<&'a str>,
-    /// Table in place of the scenario's.
+    /// Table that replaces the table of the scenario.
     pub table: Option<&'a str>,
-    /// Observations of the filter; `None` for the table, or velocity by hand.
+    /// Whether the sensor is turned by hand, without a table; a list of moves always is.
+    pub by_hand: bool,
+    /// Observations used by the filter. `None` means the table or, by hand, velocity.
     pub aiding: Option<Aiding>,
     /// Error terms to estimate.
     pub terms: Vec<ErrorTerm>,
@@ -48,9 +50,9 @@ pub struct Evaluation {
     pub duration: f64,
     /// Total duration of the dwells, s.
     pub standing: f64,
-    /// Observations of the filter.
+    /// Observations used by the filter.
     pub aiding: Aiding,
-    /// Expected covariance, its history, and the combinations of parameters that it determines.
+    /// Expected covariance, its history, and the combinations of parameters that the path determines.
     pub bound: Bound,
     /// Error terms that are not estimated.
     pub left_off: Vec<TermLeftOff>,
@@ -60,7 +62,8 @@ pub struct Evaluation {
     pub navigation: Vec<Outlook>,
 }
 
-/// Accuracy of a calibration that lacks one move: attitude, velocity and position may change arbitrarily during it.
+/// Accuracy of a calibration without the information from one move: attitude, velocity and position may change
+/// arbitrarily during this move.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Without {
     /// Time of the move and the dwell after it, s.
@@ -86,7 +89,7 @@ pub enum PathError {
     /// A model cannot be read.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// Words that are not moves.
+    /// The words are not moves.
     #[error("{0}")]
     Words(String),
     /// The table cannot follow the path.
@@ -101,11 +104,34 @@ pub enum PathError {
 }
 
 impl PathStudy {
-    /// A path with the models given by name.
+    /// Reads a path and the models that are given by name.
     ///
     /// # Errors [`PathError`] if a model cannot be read, or the words are not moves.
     pub fn load(named: &Named) -> Result<Self, PathError> {
-        let by_hand = named.path.contains(',') || named.path.starts_with("turn ");
+        let is_words = named.path.contains(',') || named.path.starts_with("turn ");
+        let setting = Self::setting(&Named {
+            by_hand: named.by_hand || is_words,
+            ..named.clone()
+        })?;
+        let scenario = if is_words {
+            let path = path_by_hand(named.path);
+            let along = path.and_then(|path| setting.scenario.along(path, "by hand"));
+            along.map_err(PathError::Words)?
+        } else {
+            setting.scenario.with_path(named.path)?
+        };
+        Ok(Self {
+            scenario,
+            ..setting
+        })
+    }
+
+    /// The setting of paths: the models given by name, with the path of the scenario, which the table may not be able
+    /// to follow.
+    ///
+    /// # Errors [`PathError`] if a model cannot be read.
+    pub fn setting(named: &Named) -> Result<Self, PathError> {
+        let by_hand = named.by_hand;
         let usual = if by_hand { "mems" } else { "demo" };
         let mut scenario = Scenario::load(named.scenario.unwrap_or(usual))?;
         if let Some(model) = named.imu {
@@ -116,10 +142,6 @@ impl PathStudy {
         }
         if by_hand {
             scenario.integrator.lever_arm = Default::default();
-            let along = path_by_hand(named.path).and_then(|path| scenario.along(path, "by hand"));
-            scenario = along.map_err(PathError::Words)?;
-        } else {
-            scenario = scenario.with_path(named.path)?;
         }
         let aiding = match (named.aiding, by_hand) {
             (Some(aiding), _) => aiding,
@@ -140,7 +162,7 @@ impl PathStudy {
     /// Evaluates the path and each of its moves.
     ///
     /// # Errors
-    /// [`PathError`] if the table cannot follow the path, or no calibration is possible.
+    /// Returns [`PathError`] if the table cannot follow the path, or no calibration is possible.
     pub fn evaluate(&self) -> Result<Evaluation, PathError> {
         let motion = self.scenario.motion()?;
         let moves = motion.moves();
@@ -161,7 +183,7 @@ impl PathStudy {
     }
 
     /// A simulated recording along the path, with its truth.
-    fn record(&self) -> Result<(Run, PerSensor<Triad>, TermVector), TableError> {
+    pub(super) fn record(&self) -> Result<(Run, PerSensor<Triad>, TermVector), TableError> {
         let simulated = self.scenario.simulate(self.scenario.seed, 0)?;
         let mut run = simulated.run;
         if self.by_hand {
@@ -173,10 +195,10 @@ impl PathStudy {
 }
 
 impl Evaluation {
-    /// Expected results of calibrating a run's own recording, linearised at the triads where the filter would start.
+    /// Expected results of the calibration of a run, linearised at the triads with which the filter would start.
     ///
     /// # Errors
-    /// [`PathError`] if no calibration is possible.
+    /// Returns [`PathError`] if no calibration is possible.
     pub fn of_run(run: &Run, options: &Options) -> Result<Self, PathError> {
         let problem = Problem::new(run, options);
         let start = coarse_start(&problem)?;
@@ -185,7 +207,7 @@ impl Evaluation {
         Ok(evaluation)
     }
 
-    /// Every limit of a specification, for a unit at its nominal values: a limit that passes can be decided.
+    /// Check of every limit of a specification for a unit at its nominal values; a limit that passes can be decided.
     pub fn decided(&self, specification: &Specification) -> Vec<Check> {
         decided(specification, &self.bound.estimate)
     }

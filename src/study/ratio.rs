@@ -1,4 +1,4 @@
-//! Ratios of two methods over the same runs, with a bootstrap interval.
+//! Ratios between two methods over the same runs, with a bootstrap interval.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -15,14 +15,14 @@ const SEED: u64 = 0;
 pub struct Ratio {
     /// Ratio over all runs.
     pub value: f64,
-    /// 99 % interval: percentiles of the ratio over runs drawn with replacement (Efron, Tibshirani,
-    /// *An Introduction to the Bootstrap*, §13.3).
+    /// 99 % interval, from percentiles of the ratio over runs that are drawn with replacement (Efron, Tibshirani, *An
+    /// Introduction to the Bootstrap*, §13.3).
     pub interval: (f64, f64),
 }
 
 impl Ratio {
-    /// The ratio of two root mean squares over the same runs, each given by the sums of squares of all
-    /// runs; `None` without runs.
+    /// The ratio of two root mean squares over the same runs, each given by the sums of squares of all runs; `None` if
+    /// there are no runs.
     pub fn of(over: &[f64], under: &[f64]) -> Option<Self> {
         let sum = |of: &[f64], chosen: &[usize]| chosen.iter().map(|&k| of[k]).sum::<f64>();
         let ratio = |chosen: &[usize]| (sum(over, chosen) / sum(under, chosen)).sqrt();

@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-/// Part `index` of `of` of a job: every `of`-th run, the first being run `index - 1`.
+/// Part `index` of `of` parts of a job, which contains every `of`-th run, starting with run `index - 1`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Shard {
     /// Number of the part, from one.
@@ -22,8 +22,8 @@ pub struct Shard {
 pub struct ShardError;
 
 impl Shard {
-    /// The numbers of the part's runs among `count` runs, from zero, in order. A part read from a file may be invalid:
-    /// its runs may then repeat endlessly.
+    /// The numbers, from zero and in order, of the runs in this part of `count` runs. If a part was read from a file,
+    /// it may be invalid; its runs may then repeat endlessly.
     pub fn runs(self, count: u64) -> impl Iterator<Item = u64> {
         let next = move |run: &u64| run.checked_add(self.of);
         std::iter::successors(self.index.checked_sub(1), next).take_while(move |run| *run < count)

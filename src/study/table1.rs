@@ -1,15 +1,15 @@
-//! The paper's Table 1: errors of 40 h of navigation due to the two simplified misalignment forms (Zhao,
-//! Jiang, Li 2016, §3.2).
+//! Table 1 of the paper: errors after 40 h of navigation due to the two simplified misalignment forms (Zhao, Jiang, Li
+//! 2016, §3.2).
 //!
-//! For each sample, misalignment angles are drawn (six independent ones for each triad, rows of unit norm), and the
-//! triad is calibrated by the closed form from six positions without noise. Navigation at rest uses the remaining
-//! errors, level, with perfect alignment and fixed height, for gyros and accelerometers separately. The figure of a
-//! sample is the largest absolute error of the run.
+//! For each sample, misalignment angles are drawn (six independent angles for each triad, rows of unit norm), and the
+//! triad is calibrated by the closed form from six positions without noise. Navigation then uses the remaining errors
+//! of the gyros and of the accelerometers separately, for a level body at rest with perfect alignment and fixed height.
+//! The figure of a sample is the largest absolute error of the run.
 //!
-//! Navigation uses the linear error model. This suffices because the errors are small: the neglected terms
-//! are products of two errors, at most a hundredth of the largest error in any row of the table (a test
-//! compares it with nonlinear navigation). Second-order terms of the calibration, such as scale factors of
-//! rows of unit norm, are included.
+//! Navigation uses the linear error model. A linear model suffices because the errors are small. The neglected terms
+//! are products of two errors and are at most a hundredth of the largest error in any row of the table (a test compares
+//! the model with nonlinear navigation). Second-order terms of the calibration, such as scale factors of rows of unit
+//! norm, are included.
 
 pub mod paper;
 mod quantity;
@@ -32,7 +32,7 @@ pub use paper::{Installation, Kind, Reading};
 pub use quantity::{ByQuantity, Moments, QUANTITIES};
 pub use verdict::{AGREEMENT, Verdict};
 
-/// Minimum number of samples for verdicts, so that only the sampling error of the paper matters.
+/// Minimum number of samples for verdicts; with this number, only the sampling error of the paper matters.
 pub const POPULATION: usize = 4000;
 
 /// Number of times at which the errors of samples are stored.
@@ -60,13 +60,13 @@ pub enum Table1Error {
     /// The heading is undefined near a pole in East-North-Up.
     #[error(transparent)]
     Navigation(#[from] NavigationStudyError),
-    /// Invalid length of a run, h.
+    /// The length of a run, in h, is invalid.
     #[error("a run of {0} h; expected more than 0 h")]
     Hours(f64),
     /// Standard deviations need two samples.
     #[error("{0} samples; expected at least 2")]
     Samples(usize),
-    /// The positions of a sample leave its calibration undetermined.
+    /// The positions of a sample do not determine its calibration.
     #[error(
         "sample {0} cannot be calibrated from six positions: its misalignment angles are too large"
     )]
@@ -78,9 +78,9 @@ pub enum Table1Error {
 pub struct Table1 {
     /// The configuration.
     pub study: Table1Study,
-    /// Number of samples for the verdicts; the first of them are those of the study.
+    /// Number of samples for the verdicts; the first of these samples are the samples of the study.
     pub population: usize,
-    /// The paper's columns, in its order.
+    /// The columns of the paper, in the order of the paper.
     pub columns: Vec<Column>,
 }
 
@@ -99,19 +99,19 @@ pub struct Column {
     pub courses: Courses,
 }
 
-/// Results for one column of the paper's table, under one interpretation of the paper. Errors in the usual units of [`QUANTITIES`].
+/// Results for one column of the table in the paper, under one interpretation of the paper. Errors in the usual units
+/// of [`QUANTITIES`].
 #[derive(Debug, Clone)]
 pub struct Row {
     /// The reading.
     pub reading: &'static Reading,
     /// Length of the runs, h.
     pub hours: f64,
-    /// Moments over the samples of the study.
+    /// Mean and standard deviation over the samples of the study.
     pub sample: ByQuantity<Moments>,
-    /// Moments over the population.
+    /// Mean and standard deviation over the population.
     pub population: ByQuantity<Moments>,
-    /// Difference of the paper's mean from that of the population, in standard errors of the
-    /// difference.
+    /// Mean of the paper minus mean of the population, in standard errors of the difference.
     pub difference: ByQuantity<f64>,
     /// Errors of the sensed rate (rad/s) or specific force (m/s²) along body axes, computed − true, of
     /// each sample of the study.
@@ -119,7 +119,7 @@ pub struct Row {
 }
 
 impl Column {
-    /// All rows; the stated reading first.
+    /// All rows, of which the first is that of the stated reading.
     pub fn rows(&self) -> impl Iterator<Item = &Row> {
         std::iter::once(&self.stated).chain(&self.others)
     }
@@ -132,14 +132,14 @@ impl Row {
     }
 }
 
-/// Errors against time: attitude with its sign, velocity and position as norms.
+/// Errors against time, with signed attitude errors and norms of velocity and position.
 #[derive(Debug, Clone, Default)]
 pub struct Courses {
     /// Times, s.
     pub times: Vec<f64>,
     /// Errors of the first samples (at most as many as in the paper) at each time.
     pub samples: Vec<Vec<ByQuantity<f64>>>,
-    /// Moments over all samples of the study, at each time.
+    /// Mean and standard deviation over all samples of the study, at each time.
     pub moments: Vec<ByQuantity<Moments>>,
 }
 
@@ -147,7 +147,7 @@ impl Table1Study {
     /// Computes the table on all cores. The result does not depend on the number of cores.
     ///
     /// # Errors
-    /// [`Table1Error`] if the configuration is invalid.
+    /// Returns [`Table1Error`] if the configuration is invalid.
     pub fn run(&self) -> Result<Table1, Table1Error> {
         if self.samples < 2 {
             return Err(Table1Error::Samples(self.samples));

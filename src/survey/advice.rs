@@ -1,4 +1,4 @@
-//! The next move of a hand-held sensor: among 26 attitudes and six turns, the one that lowers the σ most.
+//! The next move of a hand-held sensor: of 26 attitudes and six turns, the move that reduces the σ most.
 //!
 //! The information of a short recording of the move (dwell, turn, dwell) is added to the information of the recording
 //! so far.
@@ -33,11 +33,12 @@ const PERIOD: f64 = 0.05;
 /// A move of the instrument, to be followed by a dwell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Move {
-    /// To the attitude in which this direction along right-front-up points up: an axis, an edge or a corner.
+    /// A move to the attitude in which this direction points up; the direction is given in right-front-up axes and is
+    /// an axis, an edge or a corner.
     Up(Vector3<f64>),
     /// Half a turn about this body axis, right-handed about the positive or negative axis.
     HalfTurn {
-        /// Index of the axis: right, front, up.
+        /// Index of the axis (right, front or up).
         axis: usize,
         /// Whether the turn is about the negative axis.
         is_negative: bool,
@@ -68,7 +69,7 @@ impl Move {
     }
 }
 
-/// An attitude: −1, 0 or 1 along each body axis give the upward direction, which is the direction from the centre of a
+/// An attitude, given by its upward direction with −1, 0 or 1 along each body axis: the direction from the centre of a
 /// cube to a face, an edge or a corner.
 pub type Attitude = [i8; 3];
 
@@ -84,22 +85,22 @@ fn up_in(attitude: Attitude) -> Vector3<f64> {
     Vector3::from(attitude).map(f64::from).normalize()
 }
 
-/// The attitude in which up is closest to this direction along body axes.
+/// The attitude whose upward direction is closest to this direction along body axes.
 pub fn nearest_attitude(up: &Vector3<f64>) -> Attitude {
     let apart = |of: &Attitude| up_in(*of).angle(up);
     let nearest = attitudes().min_by(|a, b| apart(a).total_cmp(&apart(b)));
     nearest.unwrap_or([0, 0, 1])
 }
 
-/// Chooses moves. The information of moves is cached for each attitude at which they begin.
+/// Chooses moves. The information from each move is cached for each attitude at which the move begins.
 #[derive(Debug, Clone, Default)]
 pub struct Advisor {
     from: BTreeMap<Attitude, Vec<(Move, DMatrix<f64>)>>,
 }
 
 impl Advisor {
-    /// The move before any calibration is possible: turns the axis up whose upward position is farthest from all
-    /// dwells.
+    /// The move to advise before any calibration is possible: it turns up the axis whose upward position is farthest
+    /// from all dwells.
     pub fn first(&self, survey: &Survey) -> Move {
         let faces = attitudes().take(6).map(up_in);
         let apart = |up: &Vector3<f64>| {
@@ -110,8 +111,8 @@ impl Advisor {
         Move::Up(farthest.unwrap_or(Vector3::z()))
     }
 
-    /// The move that lowers the σ most, from the attitude in which this direction along body axes points up. With a
-    /// specification, only σ that are too large for it count; without one, all σ.
+    /// The move that reduces the σ most, starting from the attitude in which this direction along body axes points up.
+    /// With a specification, only the σ that are too large for it count; without a specification, all σ count.
     pub fn next(
         &mut self,
         run: &Run,

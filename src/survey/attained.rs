@@ -1,26 +1,26 @@
-//! Accuracy of a recording in progress, and what a specification requires.
+//! Accuracy of a recording in progress, compared with the requirements of a specification.
 
 use super::GroupSigma;
 use crate::calibration::{Bound, Estimate, Group, OBSERVED_BELOW, ParameterVector};
 use crate::lot::{Check, Limit, Sample, Specification, Verdict, checks};
 
-/// Accuracy of the rows so far.
+/// Accuracy that the rows so far allow.
 #[derive(Debug, Clone)]
 pub struct Attained {
     /// Expected covariance with the stated noise, and its history.
     pub bound: Bound,
-    /// Expected σ relative to those of the bound.
+    /// Expected σ divided by the σ of the bound.
     pub inflation: ParameterVector,
     /// For each dwell: the time of its end in s, and the expected σ at that time.
     pub history: Vec<(f64, GroupSigma)>,
     /// Parameters that keep more than half of their prior σ.
     pub unobserved: Vec<String>,
-    /// Every limit of the specification, for a unit at its nominal values.
+    /// Check of every limit of the specification, for a unit at its nominal values.
     pub checks: Vec<Check>,
 }
 
 impl Attained {
-    /// Whether a specification is given and every limit seems to be decidable.
+    /// Whether a specification is given and, as far as can be predicted, every limit can be decided.
     pub fn is_met(&self) -> bool {
         are_decided(&self.checks)
     }
@@ -44,7 +44,7 @@ impl Attained {
     }
 }
 
-/// Whether there are limits, and all can be decided.
+/// Whether there are limits and all of them can be decided.
 pub fn are_decided(checks: &[Check]) -> bool {
     let is_decided = |check: &Check| check.verdict == Verdict::Pass;
     !checks.is_empty() && checks.iter().all(is_decided)

@@ -12,8 +12,8 @@ use crate::calibration::{
 use crate::lot::{self, Specification};
 use crate::run::Run;
 
-/// Growth of a recording after which it is calibrated again: all calibrations together take at most three times as long
-/// as the last.
+/// A recording is calibrated again after it has grown by this factor. Together, all calibrations then take at most
+/// three times as long as the last one.
 pub const GROWTH: f64 = 1.5;
 /// Spacing of the epochs of a history, s.
 const EPOCH: f64 = 1.0;
@@ -23,22 +23,22 @@ const EPOCH: f64 = 1.0;
 pub struct Status {
     /// Duration of the recording, s.
     pub duration: f64,
-    /// Content of the rows: dwells, turns, contradictions.
+    /// Content of the rows: dwells, turns and contradictions.
     pub survey: Survey,
     /// Time for which the instrument has been at rest, s; zero while it moves.
     pub still: f64,
-    /// Expected σ, or the reason why there is none yet.
+    /// Expected σ, or the reason why σ cannot be predicted yet.
     pub expected: Result<Attained, CalibrationError>,
-    /// The last calibration, of the rows at that time; `None` if it failed.
+    /// The last calibration, from the rows at that time; `None` if it failed.
     pub calibrated: Option<InterimCalibration>,
-    /// The next move; `None` if nothing is missing.
+    /// The next move; `None` if no further move is needed.
     pub next: Option<Move>,
 }
 
-/// A calibration of the rows so far. Only a calibration finds the actual noise, unmodelled errors and their σ.
+/// A calibration of the rows so far. Only a calibration shows the actual noise, unmodelled errors, and the resulting σ.
 #[derive(Debug, Clone)]
 pub struct InterimCalibration {
-    /// Duration of the recording at that time, s.
+    /// Duration of the recording at the time of the calibration, s.
     pub duration: f64,
     /// Verdict.
     pub verdict: Verdict,
@@ -62,7 +62,7 @@ pub struct Evaluator {
 }
 
 impl Evaluator {
-    /// An evaluator for these options and, if any, limits to decide.
+    /// An evaluator with these options and, optionally, limits that must be decided.
     pub fn new(options: Options, specification: Option<Specification>) -> Self {
         Self {
             options,
@@ -71,7 +71,7 @@ impl Evaluator {
         }
     }
 
-    /// The limits to decide.
+    /// The limits that must be decided.
     pub fn specification(&self) -> Option<&Specification> {
         self.specification.as_ref()
     }
@@ -115,7 +115,8 @@ impl Evaluator {
         }
     }
 
-    /// The calibration that is due in this state: after every growth by half, and when every limit seems to be decided.
+    /// The calibration that is due in this state: a calibration is due each time the recording has grown by half, and
+    /// when every limit seems to be decided.
     pub fn due(&mut self, run: &Run, status: &Status) -> Option<Due> {
         let attained = status.expected.as_ref().ok()?;
         let seems_met = status.duration > self.attempted && attained.is_met();

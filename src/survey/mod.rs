@@ -1,5 +1,5 @@
-//! Content of a recording, and the parameters that each method could observe. Nothing is calibrated: nominal scales and
-//! prior biases are used.
+//! Content of a recording, and the parameters that each method could observe. A survey does not calibrate; it uses
+//! nominal scales and prior biases.
 
 mod advice;
 mod attained;
@@ -27,9 +27,9 @@ const FORM: InstallationForm = InstallationForm::General;
 /// Content of a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Survey {
-    /// The dwells, in order.
+    /// The dwells, in order of time.
     pub rests: Vec<Rest>,
-    /// The turns between them; in concatenated sections, only those labelled as turns.
+    /// The turns between the dwells; in concatenated sections, only sections labelled as turns.
     pub turns: Vec<Turn>,
     /// Labelled sections compared with the data.
     pub labels: Vec<LabelCheck>,
@@ -45,7 +45,7 @@ pub struct Survey {
     pub directions: usize,
 }
 
-/// Directions closer than this, rad, count as one.
+/// Directions closer together than this angle, rad, count as one direction.
 pub const APART: f64 = 15.0 * DEGREE;
 
 /// A calibration method.
@@ -81,7 +81,7 @@ pub type GroupSigma = Vec<(Group, Option<f64>)>;
 pub struct Expected {
     /// RMS σ of the estimated parameters of each group, normalised to rad/s or m/s²; `None` if all are fixed.
     pub sigma: GroupSigma,
-    /// Parameters with σ above half of the prior, or determined only by the prior.
+    /// Parameters whose σ is above half of the prior σ, or which only the prior determines.
     pub unobserved: Vec<String>,
 }
 
@@ -100,7 +100,7 @@ impl Survey {
         }
     }
 
-    /// Surveys a run, without the methods.
+    /// Surveys a run without predicting the accuracy of the methods.
     pub fn of_motion(run: &Run) -> Self {
         let rests = motion::rests(run);
         let durations = || {
@@ -172,10 +172,10 @@ impl Expected {
 }
 
 /// Expected covariance of the filter for a recording: the bound at the filter's starting point, with the noise that the
-/// recording shows there.
+/// recording shows at this point.
 ///
 /// # Errors
-/// [`CalibrationError`] if the recording cannot be calibrated.
+/// Returns [`CalibrationError`] if the recording cannot be calibrated.
 pub fn bound_of_record(run: &Run, options: &Options) -> Result<Bound, CalibrationError> {
     let problem = Problem::new(run, options);
     let start = coarse_start(&problem)?;

@@ -1,4 +1,4 @@
-//! A calibration in progress, from samples in memory.
+//! A calibration in progress that uses samples in memory.
 
 use nalgebra::Vector3;
 
@@ -41,7 +41,7 @@ impl Session {
         }
     }
 
-    /// Sets the limits to be decided by the calibration.
+    /// Sets the limits that the calibration must decide.
     pub fn to_decide(self, specification: Specification) -> Self {
         Self {
             evaluator: Evaluator::new(Options::default(), Some(specification)),
@@ -53,8 +53,8 @@ impl Session {
     /// milliseconds, and as long as a calibration once the specification seems to be met.
     ///
     /// # Errors
-    /// [`SampleError`] if a number is not finite, the triads differ in length, or the period is not positive. The
-    /// samples are then not added.
+    /// Returns [`SampleError`] if a number is not finite, the triads differ in length, or the period is not positive.
+    /// If there is an error, the samples are not added.
     pub fn push(
         &mut self,
         gyro: &[Vector3<f64>],
@@ -74,7 +74,7 @@ impl Session {
     /// The state with all samples so far.
     ///
     /// # Errors
-    /// [`SampleError`] if there are none.
+    /// Returns [`SampleError`] if there are no samples.
     pub fn status(&mut self) -> Result<Status, SampleError> {
         self.evaluated = self.gyro.len();
         let run = self.run()?;
@@ -84,7 +84,7 @@ impl Session {
     /// The run of all samples so far, ready for calibration.
     ///
     /// # Errors
-    /// [`SampleError`] if there are none.
+    /// Returns [`SampleError`] if there are no samples.
     pub fn run(&self) -> Result<Run, SampleError> {
         let (gyro, accel) = (self.gyro.clone(), self.accel.clone());
         let recording = Recording::from_samples("session", 0.0, self.period, gyro, accel)?;

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::{Imperfection, PHASES, Profile, Table, Turned, phases};
 use crate::attitude::exp;
 
-/// Attitude and its derivatives at one moment.
+/// The attitude and its derivatives at one moment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Kinematics {
     /// `C_b_n`, body to East-North-Up.
@@ -115,7 +115,7 @@ impl Chain {
         self.joints.is_empty()
     }
 
-    /// Duration of the slowest joint's move, s.
+    /// Duration of the move of the slowest joint, s.
     pub fn duration(&self) -> f64 {
         let durations = self.joints.iter().map(|joint| joint.profile.duration());
         durations.fold(0.0, f64::max)

@@ -1,4 +1,4 @@
-//! Errors of a table that its readings do not include.
+//! Errors of a table that its readings do not show.
 
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
@@ -11,13 +11,13 @@ use crate::attitude::exp;
 const AXES: usize = 3;
 /// Number of directions across an axis.
 const ACROSS: usize = 2;
-/// Cosine and sine of an axis' angle, then of twice that angle.
+/// Cosine and sine of the angle of an axis, then of twice this angle.
 pub const PHASES: usize = 4;
 /// Number of errors of the axes, of all kinds.
 pub const AXIS_ERRORS: usize = ACROSS * (AXES - 1) + AXES * PHASES * ACROSS + AXES * PHASES;
 /// Errors of the base and of the axes.
 pub const TABLE_GEOMETRY: usize = 3 + AXIS_ERRORS;
-/// Rotation of the attitude in the navigation frame per error of the axes.
+/// Rotation of the attitude in the navigation frame for a unit error of the axes.
 pub type AxisResponse = SMatrix<f64, 3, AXIS_ERRORS>;
 /// Axes of a table, outermost first: direction when all angles are zero, and angle in rad.
 pub type AxisAngles = [Option<(Vector3<f64>, f64)>; AXES];
@@ -25,7 +25,7 @@ pub type AxisAngles = [Option<(Vector3<f64>, f64)>; AXES];
 /// A kind of error of the axes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum AxisError {
-    /// Non-orthogonality of an inner axis: constant tilts in two directions across it.
+    /// Non-orthogonality of an inner axis, given by constant tilts in two directions across the axis.
     Tilt,
     /// Tilt of an axis that depends on its angle, once and twice per turn: for each axis, cosine and sine of the angle
     /// and of twice the angle, in two directions across it.
@@ -36,7 +36,7 @@ pub enum AxisError {
 }
 
 impl AxisError {
-    /// Every kind, in the order of their errors.
+    /// All kinds, in the order of their errors.
     pub const ALL: [Self; 3] = [Self::Tilt, Self::Wobble, Self::Encoder];
 
     /// Indices of the errors of one axis (outermost is zero) among those of all axes.
@@ -58,12 +58,12 @@ impl AxisError {
         all.find(|kind| kind.range().contains(&index))
     }
 
-    /// Indices of its errors among those of the axes.
+    /// Indices of the errors of this kind among all errors of the axes.
     pub fn range(self) -> Range<usize> {
         self.of_axis(0).start..self.of_axis(AXES - 1).end
     }
 
-    /// This 1σ for each error of the kind on a table with this many axes.
+    /// Assigns this 1σ to each error of this kind, for a table with this many axes.
     pub fn of_table(self, axes: usize, sigma: f64) -> SVector<f64, AXIS_ERRORS> {
         let mut all = SVector::<f64, AXIS_ERRORS>::zeros();
         for axis in 0..axes.min(AXES) {
@@ -99,7 +99,7 @@ impl TableGeometry {
         self.axes.rows_range(kind.range()).amax() > 0.0
     }
 
-    /// 1σ of the base about East, North and Up, then of each error of the axes.
+    /// 1σ of the base errors about East, North and Up, followed by the 1σ of each error of the axes.
     pub fn vector(&self) -> SVector<f64, TABLE_GEOMETRY> {
         SVector::from_iterator(self.base.iter().chain(&self.axes).copied())
     }
@@ -127,11 +127,12 @@ pub fn table_geometry_name(k: usize) -> Option<String> {
     })
 }
 
-/// Rotation of the attitude of a table with axes at these angles, per error of the axes.
+/// Rotation of the attitude of a table with axes at these angles, for a unit value of each error of the axes.
 ///
 /// `C_b_n = C_base R(a₁, θ₁) [I + t₂×] R(a₂, θ₂) [I + t₃×] R(a₃, θ₃) …`: a tilt of an axis in the frame of the next one
 /// outwards rotates everything that the axis carries; in the navigation frame, this rotation is `R(a₁, θ₁) t₂` and
-/// `R(a₁, θ₁) R(a₂, θ₂) t₃`. Wobble is a t across the axis that depends on its angle, an encoder error a t along it.
+/// `R(a₁, θ₁) R(a₂, θ₂) t₃`. Wobble is a t across the axis that depends on the axis angle; an encoder error is a t
+/// along the axis.
 pub fn axis_response(axes: &AxisAngles) -> AxisResponse {
     let mut response = AxisResponse::zeros();
     let mut carried = Matrix3::identity();
@@ -155,13 +156,13 @@ pub fn axis_response(axes: &AxisAngles) -> AxisResponse {
     response
 }
 
-/// Cosine and sine of an axis' angle and of twice the angle.
+/// Cosine and sine of the angle of an axis and of twice this angle.
 pub fn phases(angle: f64) -> [f64; PHASES] {
     let ((s, c), (s2, c2)) = (angle.sin_cos(), (2.0 * angle).sin_cos());
     [c, s, c2, s2]
 }
 
-/// The axes of a table at these angles, limited to those with modelled errors.
+/// The axes of a table at these angles, limited to the axes whose errors are modelled.
 pub fn axis_angles(axes: impl IntoIterator<Item = (Vector3<f64>, f64)>) -> AxisAngles {
     let mut axes = axes.into_iter();
     std::array::from_fn(|_| axes.next())

@@ -14,8 +14,8 @@ struct Stretch {
     chain: Chain,
 }
 
-/// A path as driven by one table: attitude, rate and acceleration in closed form at any time from
-/// zero to its duration.
+/// The motion of one table along a path, with attitude, rate and acceleration in closed form at any time from zero to
+/// the duration of the path.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Motion {
     /// In order and never empty.
@@ -27,10 +27,10 @@ pub struct Motion {
 impl Motion {
     /// Drives a table with these imperfections along a path.
     ///
-    /// A rotation about body axes is checked against the lowest limits of all axes.
+    /// A rotation about body axes must stay within the lowest limits of all axes.
     ///
     /// # Errors
-    /// If the path does not fit the table's axes or is beyond its limits.
+    /// Returns an error if the path does not fit the axes of the table or exceeds its limits.
     pub fn new(
         table: &Table,
         path: &Path,
@@ -82,8 +82,8 @@ impl Motion {
         self.stretches.last().map_or(0.0, |last| last.end)
     }
 
-    /// The times in s, in order, at which derivatives of the rate jump. An integral across one of
-    /// them is best computed in two parts.
+    /// The times in s, in order, at which derivatives of the rate jump. An integral across such a time is best computed
+    /// in two parts.
     pub fn breaks(&self) -> &[f64] {
         &self.breaks
     }

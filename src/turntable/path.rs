@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 pub struct Path {
     /// Dwell before the first step, s.
     pub first_dwell: f64,
-    /// The moves, in axes of one kind.
+    /// The moves, all in table axes or all in body axes.
     pub moves: Moves,
 }
 
@@ -62,9 +62,9 @@ pub struct BodyStep {
 /// A rotation in body axes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Rotation {
-    /// By a rotation vector along body axes, rad.
+    /// A rotation by this rotation vector along body axes, rad.
     By(Vector3<f64>),
-    /// The shortest rotation that points a body axis along a direction.
+    /// The shortest rotation that makes a body axis point in a direction.
     Point {
         /// Unit vector along body axes.
         axis: Vector3<f64>,
@@ -89,14 +89,14 @@ impl Moves {
 }
 
 impl BodyStep {
-    /// The shortest duration of a rotation by this angle with its acceleration, s, beyond rounding.
+    /// The shortest duration of a rotation by this angle with this acceleration, s, apart from rounding.
     pub fn shortest(&self, angle: f64) -> f64 {
         (2.0 * PI * angle / self.acceleration).sqrt() * (1.0 + 1e-12)
     }
 }
 
 impl Rotation {
-    /// The rotation vector in body axes, rad, given the attitude `C_b_n` at its beginning.
+    /// The rotation vector in body axes, rad, given the attitude `C_b_n` at the beginning of the rotation.
     pub fn vector(&self, attitude: &Matrix3<f64>) -> Vector3<f64> {
         match *self {
             Self::By(vector) => vector,

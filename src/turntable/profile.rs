@@ -25,7 +25,7 @@ pub struct Profile {
 
 impl Profile {
     /// The turn by `angle` (rad, signed) that reaches `rate` (rad/s) and has `acceleration` (rad/s²) as its peak. A
-    /// turn that is too short for this rate keeps the acceleration and remains below the rate.
+    /// turn that is too short to reach this rate keeps the acceleration and stays below the rate.
     pub fn limited(angle: f64, rate: f64, acceleration: f64) -> Self {
         // Both ramps together turn by rate · ramp = π rate² / (2 acceleration).
         let rate = rate.min((2.0 * acceleration * angle.abs() / PI).sqrt());
@@ -73,7 +73,7 @@ impl Profile {
         [self.ramp, self.ramp + self.plateau, self.duration()]
     }
 
-    /// The state `time` seconds after the start; at rest before the start and after the end.
+    /// The state `time` seconds after the start; the axis is at rest before the start and after the end.
     pub fn at(&self, time: f64) -> Turned {
         let Self {
             rate,

@@ -13,7 +13,7 @@ const SINE: usize = 1;
 pub struct Axis {
     /// Name, such as `outer`.
     pub name: String,
-    /// Unit vector in the frame of the next axis outwards; that of the outermost in East-North-Up.
+    /// Unit vector in the frame of the next axis outwards; for the outermost axis, in East-North-Up.
     pub direction: Vector3<f64>,
     /// Highest rate, rad/s.
     pub max_rate: f64,
@@ -26,29 +26,29 @@ pub struct Axis {
 pub struct Table {
     /// The axes from the outermost to the innermost.
     pub axes: Vec<Axis>,
-    /// `C_mount`, body to the innermost axis' frame.
+    /// `C_mount`, from the body to the frame of the innermost axis.
     pub mount: Matrix3<f64>,
     /// 1σ of its errors.
     pub errors: TableErrors,
 }
 
-/// 1σ of the errors of a table's log.
+/// 1σ of the errors of a table log.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct TableAccuracy {
-    /// 1σ per axis of the position error, constant in a dwell and independent between positions, rad.
+    /// 1σ per axis of the position error, rad; the error is constant in a dwell and independent between positions.
     pub position_sigma: f64,
     /// 1σ per axis of the white error of each reading, rad.
     pub reading_sigma: f64,
     /// 1σ per axis of the additional error of a reading just after a stop, rad; the error fades within a second.
     pub settling_sigma: f64,
-    /// 1σ of errors that the reading does not include.
+    /// 1σ of errors that the reading does not show.
     pub geometry: TableGeometry,
 }
 
 /// 1σ of a table's errors, all in rad.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct TableErrors {
-    /// Position error per axis of the navigation frame: constant in a dwell, independent between positions.
+    /// Position error per axis of the navigation frame, which is constant in a dwell and independent between positions.
     pub position: f64,
     /// White error of each reading, per axis of the navigation frame.
     pub reading: f64,
@@ -68,7 +68,7 @@ pub struct TableErrors {
 }
 
 impl TableErrors {
-    /// 1σ of each error of the axes of a kind.
+    /// 1σ of each axis error of a kind.
     pub fn of_axes(mut self, kind: AxisError) -> f64 {
         *self.of_axes_mut(kind)
     }
@@ -97,7 +97,8 @@ pub struct Imperfection {
 pub struct AxisImperfection {
     /// A constant tilt.
     pub tilt: Vector3<f64>,
-    /// Coefficients of its errors, one for each of [`super::phases`] of its angle: wobble across the axis, encoder error along it.
+    /// Coefficients of the errors, one for each of the [`super::phases`] of the axis angle: wobble across the axis,
+    /// encoder error along the axis.
     pub harmonics: [Vector3<f64>; PHASES],
 }
 

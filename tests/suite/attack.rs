@@ -188,7 +188,7 @@ fn rows_that_were_lost_in_a_turn_are_left_out_and_too_many_to_fill() {
         "apply calibration.json g/run.toml -o e.csv --fill",
     );
     assert!(
-        status == 1 && message.contains("from 60.670 s on, too many to fill"),
+        status == 1 && message.contains("from 60.670 s on, which is too many to interpolate"),
         "{message}"
     );
 }

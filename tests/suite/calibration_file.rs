@@ -201,5 +201,8 @@ fn a_file_that_contradicts_itself_is_read_by_no_command_and_both_fields_are_name
         }
     }
     let message = found("/consistency", all.into());
-    assert!(message.contains("no finding about it"), "{message}");
+    assert!(
+        message.contains("without a finding about this"),
+        "{message}"
+    );
 }

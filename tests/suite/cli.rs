@@ -214,7 +214,7 @@ fn a_calibration_without_convergence_is_written_whole_and_fails() {
         .assert()
         .code(1);
     let said = String::from_utf8_lossy(&failed.get_output().stderr).into_owned();
-    assert!(said.contains("not converged"), "{said}");
+    assert!(said.contains("did not converge"), "{said}");
     let record = turncal_files::read_calibration(&out.join("calibration.json")).unwrap();
     assert_eq!(record.converged, Some(false));
     assert!(record.findings.iter().any(|f| f.kind == "not-converged"));

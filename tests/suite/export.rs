@@ -411,7 +411,7 @@ fn a_run_gives_noise_figures_sample_rate_and_nominal_scales() {
         "accelerometer_random_walk",
         3.0 * 5e-5 * (2.0 / 100.0f64).sqrt() / 10.0,
     );
-    assert!(text.contains("m/s^2/s/sqrt(Hz), usual for this noise density"));
+    assert!(text.contains("m/s^2/s/sqrt(Hz), the value that is usual for this noise density"));
     assert_eq!(divisors(&text)[0], Vector3::new(2e6, 2.1e6, 2.2e6));
     let [rate, force] = halves(&INPUTS[1]);
     let accel = kalibr_measures_any_scale(&text, force);

@@ -71,7 +71,7 @@ fn six_still_files_are_one_recording_and_give_scale_and_bias() {
     let Some(files) = faces() else { return };
     let (result, said) = calibrated(&["--gravity", "9.809"], &files);
     assert!(
-        said.contains("taken as one recording of one sensor"),
+        said.contains("treats the logs as one recording of one sensor"),
         "{said}"
     );
     assert_true(&result, [3e-4, 150.0 * MICRO_G]);

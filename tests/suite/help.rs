@@ -169,7 +169,7 @@ fn wrong_usage_is_status_two_and_says_what_to_do() {
         ),
         (&auto, "--with auto and --with none exclude each other"),
         (&velocity, "--aiding velocity does not use the table"),
-        (&study, "omit one of them"),
+        (&study, "omit one of the two options"),
         (&["calibrate", here], "this is a directory; give"),
         (
             &["export", "c.json", "--format", "c", "--run", &log],

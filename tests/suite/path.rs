@@ -9,6 +9,12 @@ fn turncal(arguments: &[&str]) -> Command {
     command
 }
 
+fn design(arguments: &[&str]) -> Command {
+    let mut command = Command::cargo_bin("turncal").unwrap();
+    command.args(["path", "design"]).args(arguments);
+    command
+}
+
 fn json(arguments: &[&str]) -> Value {
     let output = turncal(arguments).arg("--json").assert().success();
     serde_json::from_slice(&output.get_output().stdout).unwrap()
@@ -113,4 +119,76 @@ fn a_specification_that_the_path_cannot_decide_is_status_three() {
         text.contains("UNDECIDED") && text.contains("0 of 3"),
         "{text}"
     );
+}
+
+/// `three-axis` takes 524.6 s.
+#[test]
+fn a_designed_path_is_better_than_the_embedded_one_in_every_group_in_its_time() {
+    let directory = tempfile::tempdir().unwrap();
+    let file = directory.path().join("mine.toml");
+    let file = file.to_str().unwrap();
+    let arguments = ["--with", "none", "--time", "524.6", "-o", file, "--json"];
+    let output = design(&arguments).assert().success();
+    let designed: Value = serde_json::from_slice(&output.get_output().stdout).unwrap();
+    let embedded = json(&["three-axis", "--with", "none"]);
+    let time = |of: &Value| of["duration_s"].as_f64().unwrap();
+    assert!(time(&designed) <= time(&embedded) && time(&designed) > 0.99 * time(&embedded));
+    for (group, of) in embedded["sigma"].as_object().unwrap() {
+        let own = sigma(&designed, group);
+        assert!(own < of.as_f64().unwrap(), "{group}: {own} {of}");
+    }
+    // The file is the path.
+    let written = json(&[file, "--with", "none"]);
+    assert_eq!(written["sigma"], designed["sigma"]);
+}
+
+#[test]
+fn a_path_by_hand_is_designed_until_it_decides_a_specification() {
+    let directory = tempfile::tempdir().unwrap();
+    let file = directory.path().join("by-hand.toml");
+    let file = file.to_str().unwrap();
+    let setting = [
+        "--hand",
+        "--imu",
+        "bmi088",
+        "--specification",
+        "mems-by-hand",
+    ];
+    let text = |threads: &str| {
+        let mut command = design(&setting);
+        command.args(["-o", file, "--force"]);
+        command.env("RAYON_NUM_THREADS", threads).assert().success();
+        std::fs::read_to_string(file).unwrap()
+    };
+    assert_eq!(text("1"), text("3"));
+    turncal(&[file]).args(setting).assert().success();
+    // A precise limit needs more than a minute.
+    let strict = directory.path().join("strict.toml");
+    let limits = "format = \"turncal-specification/1\"\n[gyro]\nbias_deg_per_h = 0.1\n";
+    std::fs::write(&strict, limits).unwrap();
+    let strict = strict.to_str().unwrap();
+    let open = [
+        "--hand",
+        "--imu",
+        "bmi088",
+        "--time",
+        "60",
+        "--specification",
+        strict,
+    ];
+    design(&open).assert().code(3);
+}
+
+#[test]
+fn a_design_that_makes_no_sense_is_refused_with_the_remedy() {
+    for (arguments, says) in [
+        (&["--time", "20"][..], "expected 60 s or more"),
+        (&["--hand", "--table", "two-axis"], "cannot be used with"),
+        (&["--hand", "--with", "table-base"], "table"),
+        (&["--table", "four-axis"], "three-axis"),
+    ] {
+        let output = design(arguments).assert().failure();
+        let message = String::from_utf8_lossy(&output.get_output().stderr).into_owned();
+        assert!(message.contains(says), "{arguments:?}: {message}");
+    }
 }

@@ -242,7 +242,7 @@ fn a_form_that_the_instrument_does_not_have_is_betrayed_by_its_innovations() {
     assert!(outcome.consistency.velocity.mean > 100.0 && outcome.consistency.table.mean > 100.0);
     assert!(outcome.form_test.is_some_and(|test| test.rejects()));
     for sentence in [
-        "Residuals are not of the size",
+        "The size of the residuals does not agree",
         "The three-angle misalignment form does not fit the data",
     ] {
         assert!(says(&outcome, sentence));

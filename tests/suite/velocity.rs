@@ -175,7 +175,7 @@ fn where_earth_rate_points_up_the_heading_is_said_to_be_unobserved() {
     scenario.site = Site::with_normal_gravity(89.999 * DEGREE, 0.0, 0.0);
     let Trial { outcome, nees, .. } = trial(&scenario, 0);
     assert!(outcome.converged && !outcome.heading_observed());
-    let said = says(&outcome, "Heading could not be determined");
+    let said = says(&outcome, "heading could not be determined");
     assert!(said, "{:?}", outcome.findings);
     // What does not depend on it is as accurate as it claims.
     let nees = nees.0 / 21.0;

@@ -229,7 +229,7 @@ impl Run {
     /// method : {"ekf", "six-position"}
     ///     The filter over the whole run, or the closed form from dwells.
     /// with_ : str or sequence of str, optional
-    ///     "auto" (default): averages over the absence and the usual sizes of every error term; "none": only K, E and D;
+    ///     "auto" (default): average over the absence and the usual sizes of every error term; "none": only K, E and D;
     ///     or terms to estimate in any case, such as "accel-second-order".
     /// noise : {"auto", "stated", "learnt"}
     ///     Stated noise unless the data contradict it, stated noise, or noise estimated from the run.

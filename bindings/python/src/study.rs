@@ -288,6 +288,7 @@ pub fn evaluate(
             scenario: scenario.as_deref(),
             imu: imu.as_deref(),
             table: table.as_deref(),
+            by_hand: false,
             aiding,
             terms,
         })?;
@@ -300,6 +301,7 @@ pub fn evaluate(
             moves: &moves_in_words(&study.scenario),
             evaluation: &evaluation,
             checks: checks.as_deref(),
+            design: None,
         };
         Ok::<_, PathError>(Report(report.document()))
     });

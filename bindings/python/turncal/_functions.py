@@ -49,7 +49,7 @@ def read(
     noise_file : path-like, optional
         Kalibr imu.yaml with noise figures.
     accel_file : path-like, optional
-        File with the accelerometer rows, if the log contains only the gyros.
+        File that contains the accelerometer rows, if the log contains only gyro data.
     stream : str, optional
         Stream of the instrument. Default: the one with the most samples.
 

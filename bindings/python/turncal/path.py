@@ -34,10 +34,10 @@ def evaluate(
     aiding : {"table", "velocity"}, optional
         Observations of the filter. Default: table; by hand velocity.
     with_ : str or sequence of str, optional
-        "auto" (default): averages over the absence and the usual sizes of every error term; "none": only K, E and D; or
+        "auto" (default): average over the absence and the usual sizes of every error term; "none": only K, E and D; or
         terms to estimate in any case.
     specification : path-like, optional
-        Specification: tests whether the predicted σ are small enough to decide pass or fail.
+        Specification; turncal tests whether the predicted σ are small enough to decide pass or fail.
 
     Returns
     -------

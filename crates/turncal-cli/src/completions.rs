@@ -6,7 +6,7 @@ use crate::terminal::print;
 
 /// Prints a shell-completion script
 ///
-/// Save it where your shell looks for completions; the examples show where.
+/// Save the script where your shell looks for completions; the examples show the location for each shell.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal completions bash > \\

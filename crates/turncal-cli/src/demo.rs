@@ -29,14 +29,15 @@ use turncal_report::{Document, Facts};
 
 /// Simulates a calibration and compares it with the truth
 ///
-/// Simulates an instrument with the paper's errors on a three-axis table: ten minutes with turns for the filter, and an
-/// hour of static positions for the paper's closed form. Calibrates it with both methods, compares both with the truth,
-/// navigates for 40 h with each and writes a report. DIR itself is the run directory for the filter. It also contains ekf/ with the
-/// filter calibration, six-position/ with the static run and its calibration, and report/.
+/// Simulates an instrument with the errors of the paper on a three-axis table: ten minutes of turns for the filter, and
+/// an hour of static positions for the closed form of the paper. Calibrates the instrument with both methods, compares
+/// both calibrations with the truth, navigates for 40 h with each calibration, and writes a report. DIR itself is the
+/// run directory for the filter. DIR also contains ekf/ with the filter calibration, six-position/ with the static run
+/// and its calibration, and report/.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:  turncal demo -o my-demo --seed 3")]
 pub struct Demo {
-    /// Directory to write
+    /// Directory in which to write the output
     #[arg(short, long, value_name = "DIR", default_value = "turncal-demo")]
     output: PathBuf,
     /// Random seed [default: the scenario's]
@@ -113,7 +114,8 @@ fn document(
     let (table_time, whole_time) = (minutes(run), minutes(still.run()));
     let closed_form = cut(still, table_time / whole_time)?;
     let note = format!(
-        "{}; first part of each dwell, equivalent to the {table_time:.0} min table time of the filter",
+        "{}; only the first part of each dwell, so that the total is equal to the {table_time:.0} min table time of \
+         the filter",
         note(&closed_form)
     );
     let methods = [
@@ -184,13 +186,14 @@ fn fly(run: &Run, estimates: &[&Estimate], truth: &PerSensor<Triad>) -> anyhow::
     let missions = [
         (
             "stationary and level",
-            "When stationary, gyro bias causes nearly all of the error, and only time at rest reduces its σ.",
+            "When the body is stationary, gyro bias causes nearly all of the error, and only time at rest reduces the \
+             σ of this bias.",
             still,
         ),
         (
             "in flight",
-            "In flight, turns and accelerations excite scale factors and misalignments, which the filter observes in \
-             minutes.",
+            "In flight, turns and accelerations bring in the scale factors and misalignments, which the filter \
+             observes within minutes.",
             flying,
         ),
     ];

@@ -1,6 +1,6 @@
-//! Commands: each parses its arguments, calls the library and reports the result.
+//! The commands. Each command parses its arguments, calls the library and reports the result.
 
-/// Prints a line on standard error. A closed pipe, as with `head`, is not a failure.
+/// Prints a line on standard error. A closed pipe, as with `head`, is not an error.
 macro_rules! tell {
     ($($words:tt)*) => {
         let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("{}\n", format_args!($($words)*)));
@@ -93,8 +93,8 @@ enum Command {
     Man(man::Manual),
 }
 
-/// Runs a command line and returns its exit status. The first argument is the name of the command. Wrong usage exits at
-/// once.
+/// Runs a command line and returns its exit status. The first argument is the name of the command. Wrong usage ends the
+/// process at once.
 pub fn command(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let cli = Cli::parse_from(arguments);
     leave_nothing_behind();

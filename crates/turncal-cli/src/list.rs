@@ -6,16 +6,16 @@ use crate::terminal::show;
 use turncal::models::Embedded;
 use turncal_report::{Document, Facts};
 
-/// Shows the embedded scenarios, instruments, installations, tables, paths and trajectories
+/// Lists the embedded scenarios, instruments, installations, tables, paths and trajectories
 ///
-/// Commands and your own scenarios accept these names in place of a TOML file. If a file of that name exists,
-/// the file is used instead.
+/// You can give these names instead of TOML files on the command line and in your own scenarios. If a file with this
+/// name exists, turncal uses the file instead.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal list
   turncal list --json | jq -r '.[].name'")]
 pub struct List {
-    /// Print the list as one JSON document and nothing else
+    /// Print the list as a single JSON document, without any other output
     #[arg(long)]
     json: bool,
 }

@@ -9,17 +9,17 @@ use turncal_files::write_whole;
 
 /// Writes the manual pages
 ///
-/// Writes one page for turncal and one per command into DIR, and keeps other files there; without -o, writes the
-/// turncal page to standard output.
+/// Writes one page for turncal and one page per command into DIR, and leaves other files in DIR unchanged. Without -o,
+/// writes the turncal page to standard output.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal man | man -l -
   turncal man -o ~/.local/share/man/man1")]
 pub struct Manual {
-    /// Directory for turncal.1, turncal-calibrate.1 and the others
+    /// Directory for turncal.1, turncal-calibrate.1 and the other pages
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
-    /// Replace pages that exist; other files in DIR are never touched
+    /// Replace existing pages; other files in DIR are never changed
     #[arg(long)]
     force: bool,
 }

@@ -3,7 +3,7 @@
 use crate::terminal::print;
 use turncal_files::run_schema;
 
-/// Prints the JSON schema of run.toml, for completion and checks in editors
+/// Prints the JSON schema of run.toml, which editors can use for completion and validation
 ///
 /// Save the schema and refer to it in the first line of a run.toml: #:schema ./run.schema.json
 #[derive(Debug, clap::Args)]

@@ -10,7 +10,7 @@ use crate::terminal::Activity;
 use turncal::simulation::{Scenario, Simulated, SimulatedCampaign};
 use turncal_files::{campaign_text, write_run};
 
-/// Simulates a run directory with known truth from a scenario
+/// Simulates a run with known truth from a scenario, and writes its directory
 ///
 /// Writes run.toml, its logs and truth.json. The scenario is a TOML file or an embedded name from turncal list.
 #[derive(Debug, clap::Args)]
@@ -21,7 +21,7 @@ use turncal_files::{campaign_text, write_run};
 pub struct Simulate {
     /// Scenario or campaign: a TOML file or an embedded name
     scenario: String,
-    /// Directory to write
+    /// Directory in which to write the output
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
     /// Random seed [default: from the scenario]
@@ -49,8 +49,8 @@ impl Simulate {
         if simulated.geometry.rows_range(3..).amax() > 0.0 {
             tell!(
                 "note: the axes of the simulated table have errors (non-orthogonality, wobble, encoders) that the \
-                 quaternions in its log cannot show, so a calibration from these files will state misalignment σ \
-                 that are too small. turncal study accuracy estimates these errors."
+                 quaternions in the table log cannot show, so the misalignment σ of a calibration with these files \
+                 will be too small. turncal study accuracy estimates these errors."
             );
         }
         tell!(

@@ -1,4 +1,4 @@
-//! Single entry point for inputs: a `run.toml`, or a log whose description is found in it or stated by options.
+//! Single entry point for inputs: a `run.toml`, or a log that is described by its own content and by options.
 
 use std::ffi::OsStr;
 use std::fs::{self, File};
@@ -17,7 +17,7 @@ const STANDARD_INPUT: &str = "-";
 /// File name for rows of standard input.
 const PIPED: &str = "stdin.csv";
 
-/// A run and, for a log without run.toml, the draft used to read it.
+/// A run and, for a log without run.toml, the draft with which the log was read.
 #[derive(Debug)]
 pub struct Opened {
     /// The run.
@@ -34,11 +34,12 @@ struct Log {
 }
 
 impl Opened {
-    /// Reads a `run.toml` (by extension), a log, or text on standard input (`-`). The draft for a log is shown before
-    /// any error.
+    /// Reads a `run.toml` (by extension), a log, or text on standard input (`-`). Shows the draft for a log before any
+    /// error.
     ///
     /// # Errors
-    /// [`FileError`] if it cannot be read, or if required fields of a log are neither detected nor stated.
+    /// Returns [`FileError`] if the file cannot be read, or if required fields of a log are neither detected nor
+    /// stated.
     pub fn new(
         path: &Path,
         stream: Option<&str>,
@@ -57,10 +58,10 @@ impl Opened {
         Ok(opened)
     }
 
-    /// Does the same as [`Self::new`] for files in memory: a `run.toml` or a log, and the files it may refer to.
+    /// Does the same as [`Self::new`] for files in memory: a `run.toml` or a log, and the files that it refers to.
     ///
     /// # Errors
-    /// As for [`Self::new`].
+    /// The same errors as [`Self::new`].
     pub fn in_memory(
         files: &[DataFile],
         stream: Option<&str>,
@@ -68,16 +69,16 @@ impl Opened {
         show: impl FnOnce(&Draft),
     ) -> Result<Self, FileError> {
         let Some(file) = files.first() else {
-            let advice = "Give a log, or a run.toml with the files it refers to.";
+            let advice = "Give a log, or give a run.toml together with the files that it names.";
             return Err(FileError::of(Path::new(""), "no file", "a log", advice));
         };
         Self::of_file(file, files, (stream, stated), show)
     }
 
-    /// Reads several logs of one sensor, each of one position; `None` if it was turned in one.
+    /// Reads several logs of one sensor, each recorded in one position; `None` if the sensor was turned in any of them.
     ///
     /// # Errors
-    /// As for [`Self::new`], and if the logs have different columns.
+    /// The errors of [`Self::new`], and an error if the logs have different columns.
     pub fn of_positions(
         paths: &[PathBuf],
         (stream, stated): (Option<&str>, &Stated),
@@ -112,9 +113,9 @@ impl Opened {
     ) -> Result<Self, FileError> {
         if is_toml(file) {
             if stream.is_some() || *stated != Stated::default() {
-                let found = "options that describe a log, given with a run.toml (rate, units, site, sensor, stream)";
-                let advice = "Write these statements into run.toml, or omit the options.";
-                let expected = "all statements in run.toml";
+                let found = "options that describe a log (rate, units, site, sensor, stream) together with a run.toml";
+                let advice = "Write this information into run.toml, or omit the options.";
+                let expected = "this information in run.toml";
                 return Err(FileError::of(file, found, expected, advice));
             }
             let run = match file.bytes().map(String::from_utf8_lossy) {
@@ -142,10 +143,10 @@ impl Opened {
         Ok(Self { run, log })
     }
 
-    /// Reads a log that has grown, with the fields found earlier.
+    /// Reads a log that has grown, using the fields detected earlier.
     ///
     /// # Errors
-    /// [`FileError`] if it cannot be read.
+    /// Returns [`FileError`] if the log cannot be read.
     pub fn read_again(&mut self) -> Result<(), FileError> {
         if let Some(Log { path, draft, .. }) = &self.log {
             let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -154,7 +155,7 @@ impl Opened {
         Ok(())
     }
 
-    /// Whether there was no `run.toml`.
+    /// Whether the input was a log without a `run.toml`.
     pub fn is_of_log(&self) -> bool {
         self.log.is_some()
     }
@@ -162,7 +163,7 @@ impl Opened {
     /// Writes the `run.toml` used to read a log into a result directory.
     ///
     /// # Errors
-    /// [`FileError`] if it cannot be written.
+    /// Returns [`FileError`] if the file cannot be written.
     pub fn write_run(&self, directory: &Path) -> Result<(), FileError> {
         let Some(log) = &self.log else {
             return Ok(());
@@ -178,7 +179,8 @@ impl Opened {
     }
 }
 
-/// Whether a file is, by its extension, a `run.toml` or `campaign.toml` (which refer to other files) and not a log.
+/// Whether the file extension shows that the file is a `run.toml` or `campaign.toml`, which refers to other files, and
+/// not a log.
 pub fn is_toml(path: &Path) -> bool {
     path.extension() == Some(OsStr::new("toml"))
 }

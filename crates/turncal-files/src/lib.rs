@@ -1,6 +1,6 @@
 //! Files: input of runs, input and output of calibrations, exports for other programs.
 //!
-//! A [`turncal::run::Run`] read here is in SI, on right-front-up body axes and in normalised outputs (see
+//! A [`turncal::run::Run`] read here is in SI units, along right-front-up body axes and with normalised outputs (see
 //! [`turncal::imu::Nominal`]); file units and axes are converted here.
 
 pub mod directories;

@@ -16,7 +16,7 @@ pub const OUTPUTS: [Output; 3] = [Output::Pulse, Output::Increment, Output::Rate
 pub enum Of {
     /// Rows of a triad.
     Rows(Sensor, Output),
-    /// A count of any quantity.
+    /// A count, of any quantity.
     Count,
     Time,
     Other,
@@ -52,16 +52,19 @@ const UNITS: [Row; 22] = [
 ];
 
 /// File units that `run.toml` lacks, as multiples of its units.
-const MULTIPLES: [(&str, f64, &[&str]); 5] = [
+const MULTIPLES: [(&str, f64, &[&str]); 8] = [
     ("m/s^2", 1e-2, &["cm/s2", "gal"]),
     ("m/s^2", 1e-3, &["mm/s2"]),
     ("rad/s", 1e-3, &["mrad/s"]),
     ("deg/s", 6.0, &["rpm"]),
     ("g", 1e-6, &["ug"]),
+    ("s", 60.0, &["min", "minute", "minutes"]),
+    ("s", 3600.0, &["hour", "hours"]),
+    ("s", 86_400.0, &["day", "days"]),
 ];
 
-/// Units of the rows of a triad: quantity of the file per second for one rad/s or m/s². A count has no inherent nominal
-/// scale.
+/// Units of the rows of a triad: quantity of the file per second for one rad/s or m/s². A count does not imply a
+/// nominal scale.
 pub fn units(sensor: Sensor, output: Output) -> impl Iterator<Item = (&'static str, Option<f64>)> {
     let usable = move |row: &&Row| row.1 == Count || row.1 == Rows(sensor, output);
     let scaled = |&(word, of, per_si, _): &Row| (word, (of != Count).then_some(per_si));
@@ -74,7 +77,7 @@ pub fn units_of_time() -> impl Iterator<Item = (&'static str, f64)> {
     of_time.map(|&(word, _, per_si, _)| (word, per_si.recip()))
 }
 
-/// The unit in a text: name in `run.toml`, multiple of it, and quantity.
+/// The unit in a text: the name in `run.toml`, the multiple of this unit, and the quantity.
 pub fn spelled(text: &str) -> Option<(&'static str, f64, Of)> {
     let text = normalised(text);
     let has = |spellings: &[&str]| spellings.contains(&text.as_str());

@@ -8,13 +8,13 @@ use turncal_logs::{DataFile, Source};
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sheet {
     pub names: Vec<String>,
-    /// Units from the row below the names; empty without such a row.
+    /// Units from the row below the column names; empty if there is no such row.
     pub units: Vec<String>,
     /// Row rate stated in comments, Hz.
     pub rate: Option<f64>,
-    /// NaN for missing numbers.
+    /// The numbers; NaN where a number is missing.
     pub columns: Vec<Vec<f64>>,
-    /// Whether the file has further rows.
+    /// Whether the file contains more rows than were read.
     pub goes_on: bool,
 }
 
@@ -22,7 +22,7 @@ pub struct Sheet {
 const MOST: usize = 6 << 20;
 
 impl Sheet {
-    /// Reads a file that has at least this many rows.
+    /// Reads a file that must contain at least this many rows.
     pub fn read(file: &DataFile, fewest: usize) -> Result<Self, FileError> {
         Self::of(Source::of_file(file.clone()).open()?, fewest)
     }

@@ -1,4 +1,4 @@
-//! Values checked while reading, so that errors give their line.
+//! Values that are checked while they are read, so that errors can give the line.
 
 use std::ops::RangeInclusive;
 
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize, Serializer};
 
 use crate::units::MILLIGAL;
 
-/// Gravity anywhere at these heights, m/s².
+/// Possible values of gravity at these heights, m/s².
 pub const GRAVITIES: RangeInclusive<f64> = 9.7..=9.9;
 
 /// Heights from the shore of the Dead Sea to above any laboratory, m.
@@ -75,7 +75,7 @@ checked!(
     Celsius, "a number from -100 to 100", |v| v.abs() <= 100.0;
 );
 
-/// 1σ of a gravity stated without σ, m/s²: from its last digit, at least one milligal.
+/// 1σ of a gravity that is stated without σ, m/s²: derived from its last digit, at least one milligal.
 pub fn stated_gravity_sigma(written: &str) -> f64 {
     let digits = written
         .split_once('.')

@@ -33,14 +33,14 @@ const MEANINGS: [(&str, &str); 19] = [
     ("reading_sigma_arcsec", "a 1σ value in arcseconds"),
     (
         "recording",
-        "one [[recording]] per run, with run = \"its run.toml\"",
+        "one [[recording]] per run, with run = \"the path of its run.toml\"",
     ),
     ("run", "the path of a run.toml"),
-    ("sigma", "the 1σ of each of its parameters"),
+    ("sigma", "the 1σ of each parameter of the error term"),
     ("time", "a column name"),
     (
         "time_stamp",
-        "the moment within a sample that its time stamp marks",
+        "the part of a sample that its time stamp marks",
     ),
     ("uncertainty", "the expanded uncertainty, k = 2"),
 ];
@@ -52,10 +52,10 @@ const KINDS: [(&str, &str); 4] = [
     ("a map", "a table"),
 ];
 
-/// The text that spans refer to.
+/// The text to which spans refer.
 #[derive(Clone, Copy)]
 pub struct Document<'a> {
-    /// The file name in errors.
+    /// The file name used in errors.
     pub file: &'a Path,
     /// Text.
     pub text: &'a str,
@@ -85,7 +85,7 @@ impl<'a> Document<'a> {
         })
     }
 
-    /// Fields converted to a type.
+    /// The fields of a document, converted to a type.
     pub fn fill<T: Deserialize<'a>>(self, table: Spanned<DeTable<'a>>) -> Result<T, FileError> {
         T::deserialize(Deserializer::from(table)).map_err(|error| self.refused(&error))
     }
@@ -129,7 +129,7 @@ impl<'a> Document<'a> {
         self.no_field(span, table, name, meaning)
     }
 
-    /// Refuses names of fields in a table, `table.table`, that are not among the known ones.
+    /// Refuses field names in a table, `table.table`, that are not among the known names.
     pub fn only(
         self,
         path: &str,

@@ -1,4 +1,4 @@
-//! Error type of this module: place, content found, content expected, remedy.
+//! Error type of this module: location, content found, content expected, remedy.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -8,7 +8,7 @@ const LONGEST: usize = 200;
 /// Longest file name of any file system.
 const LONGEST_NAME: usize = 255;
 
-/// An input short enough for a message.
+/// An input, shortened to fit into a message.
 pub fn excerpt(text: &str) -> String {
     match text.char_indices().nth(LONGEST) {
         Some((end, _)) => format!("{} …", &text[..end]),
@@ -35,7 +35,7 @@ fn shown(path: &Path) -> String {
 pub struct FileError {
     /// The file at fault.
     pub file: PathBuf,
-    /// Place in the file.
+    /// Location of the error in the file.
     pub place: Place,
     /// Content found, content expected, remedy.
     pub message: String,
@@ -48,7 +48,7 @@ pub enum Place {
     File,
     /// A line.
     Line(u64),
-    /// A line and a character of it.
+    /// A line and a character of this line.
     Character {
         /// Line.
         line: u64,
@@ -62,7 +62,7 @@ pub enum Place {
         /// Name in the header.
         column: String,
     },
-    /// A row of a table in memory, from zero, and a column of it.
+    /// A row and a column of a table in memory; rows count from zero.
     Row {
         /// Row.
         row: u64,
@@ -71,7 +71,7 @@ pub enum Place {
     },
     /// A byte of a binary file; the first is 0.
     Byte(u64),
-    /// A sample of a stream of such a file.
+    /// A sample of a stream in a binary file.
     Sample {
         /// Number of the sample, from one.
         number: u64,
@@ -139,7 +139,7 @@ impl FileError {
         }
     }
 
-    /// An error about the whole file.
+    /// An error that concerns the whole file.
     pub fn of(
         file: &Path,
         found: impl fmt::Display,
@@ -149,7 +149,7 @@ impl FileError {
         Self::new(file, Place::File, found, expected, advice)
     }
 
-    /// An error for a quantity that a file does not show: `… is unknown: reason. Remedy.`
+    /// An error for a quantity that a file does not contain: `… is unknown: reason. Remedy.`
     pub fn unknown(file: &Path, what: &str, why: &str, advice: &str) -> Self {
         Self {
             file: file.to_owned(),
@@ -214,7 +214,7 @@ pub fn suggestion<'a>(
 /// Maximum number of characters of candidate names shown.
 const ROOM: usize = 2 * LONGEST;
 
-/// All candidate names, if they fit; otherwise the most similar first, and the number of others.
+/// All candidate names if they fit into the message; otherwise the most similar names and the number of the others.
 pub fn choice<'a>(wanted: &str, names: impl IntoIterator<Item = &'a str>) -> String {
     let names: Vec<&str> = names.into_iter().collect();
     let all = list(names.iter().copied());

@@ -1,8 +1,8 @@
-//! Functions shared by all readers: errors with file, line and field; TOML documents; checked numbers; units.
+//! Functions that all readers share: errors with file, line and field; TOML documents; checked numbers; units.
 //!
 //! If a reader finds something other than it expects, a [`FileError`] gives what was found, what was expected, what to
-//! do, and where. [`Document`] gives these errors for TOML files, [`small_file`] reads a file as a whole with a limit
-//! on its size, and the checked numbers ([`Positive`], [`Latitude`] …) refuse a field that cannot be right.
+//! do, and where. [`Document`] gives these errors for TOML files, [`small_file`] reads a whole file up to a maximum
+//! size, and the checked numbers ([`Positive`], [`Latitude`] …) refuse values that cannot be right.
 
 mod checked;
 mod document;

@@ -1,4 +1,4 @@
-//! Column names, each for one quantity.
+//! Column names, each of which may be used for one quantity only.
 
 use super::error::{choice, excerpt, nearest};
 
@@ -7,12 +7,12 @@ use super::error::{choice, excerpt, nearest};
 pub struct FileColumn {
     /// Name in the file; empty if the triad was not recorded.
     pub name: String,
-    /// Whether its values are read with the sign reversed.
+    /// Whether the values of the column are read with the sign reversed.
     pub reversed: bool,
 }
 
-/// Index of an unused column by name or, if no column has this name, by number. The error consists of the content
-/// found, the content expected and the remedy.
+/// Index of an unused column by name or, if no column has this name, by number. The error contains the content found,
+/// the content expected and the remedy.
 pub fn find(all: &[String], taken: &[usize], name: &str) -> Result<usize, [String; 3]> {
     let mut places: Vec<usize> = (0..all.len()).filter(|&place| all[place] == name).collect();
     if let Ok(number) = name.parse::<usize>()
@@ -32,10 +32,11 @@ pub fn find(all: &[String], taken: &[usize], name: &str) -> Result<usize, [Strin
         [_, ..] => Err([
             format!("two columns named `{name}`"),
             "a unique name".to_owned(),
-            "Refer to it by its number (the first is `1`), or rename one of them.".to_owned(),
+            "Refer to the column by its number (the first is `1`), or rename one of the columns."
+                .to_owned(),
         ]),
         [] => {
-            let advice = "Correct `columns` in run.toml or this header.";
+            let advice = "Correct `columns` in run.toml, or the names in this header.";
             Err([
                 format!("no column named `{}`", excerpt(name)),
                 format!("one of {}", choice(name, header())),

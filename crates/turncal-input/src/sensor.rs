@@ -52,7 +52,7 @@ impl<T> PerSensor<T> {
         sensor.pick(&mut self.gyro, &mut self.accel)
     }
 
-    /// Builds both values from a function of the triad.
+    /// Computes both values with a function of the triad.
     pub fn from_fn(mut f: impl FnMut(Sensor) -> T) -> Self {
         Self {
             gyro: f(Sensor::Gyro),
@@ -60,7 +60,7 @@ impl<T> PerSensor<T> {
         }
     }
 
-    /// The value of each sensor, or the first error.
+    /// The value for each sensor, or the first error.
     pub fn try_from_fn<E>(mut f: impl FnMut(Sensor) -> Result<T, E>) -> Result<Self, E> {
         Ok(Self {
             gyro: f(Sensor::Gyro)?,

@@ -19,7 +19,7 @@ pub fn read(path: &Path) -> io::Result<Vec<u8>> {
     file.take(MOST_BYTES + 1).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > MOST_BYTES {
         let most = MOST_BYTES >> 20;
-        let why = format!("it is longer than {most} MiB, the limit for such files");
+        let why = format!("it is longer than {most} MiB, which is the limit for such files");
         return Err(io::Error::new(ErrorKind::FileTooLarge, why));
     }
     Ok(bytes)
@@ -31,19 +31,19 @@ pub fn read_text(path: &Path) -> io::Result<String> {
     String::from_utf8(read(path)?).map_err(not_text)
 }
 
-/// All bytes of a small file that contains `what`.
+/// All bytes of a small file; errors call its content `what`.
 pub fn bytes(path: &Path, what: &str, advice: &str) -> Result<Vec<u8>, FileError> {
     let bytes = read(path);
     bytes.map_err(|error| FileError::io(path, &format!("read {what}"), &error, advice))
 }
 
-/// The text of a small file that contains `what`.
+/// The text of a small file; errors call its content `what`.
 pub fn text(path: &Path, what: &str, advice: &str) -> Result<String, FileError> {
     let text = read_text(path);
     text.map_err(|error| FileError::io(path, &format!("read {what}"), &error, advice))
 }
 
-/// Reads a small JSON file and checks that its `format` is this one.
+/// Reads a small JSON file and checks that its `format` is the given one.
 pub fn json<T: DeserializeOwned>(
     path: &Path,
     what: &str,

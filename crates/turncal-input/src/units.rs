@@ -1,4 +1,4 @@
-//! Units for input and output: one SI or radian value per named unit.
+//! Units for input and output: the value of each named unit in SI units or radians.
 //!
 //! Inside the crate, all values are in SI units and radians. Input is converted by `x * UNIT` and output by `x / UNIT`;
 //! there are no other conversions.

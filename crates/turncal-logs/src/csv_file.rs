@@ -16,7 +16,7 @@ use flate2::read::MultiGzDecoder;
 
 use super::data_file::DataFile;
 use super::rows::Rows;
-use heading::{Heading, Looks};
+use heading::{Heading, Looks, other_number};
 pub use kind::{RowKind, is_remark};
 use lines::{LONGEST, Line, Lines, Stop};
 use row::{LONGEST_FIELD, MOST_COLUMNS, Malformed, Row};
@@ -26,12 +26,12 @@ use turncal_input::{FileError, Place, counted, excerpt};
 /// First bytes of a gzipped file.
 const GZIP: [u8; 2] = [0x1f, 0x8b];
 
-/// A file of rows, positioned at one row.
+/// A file of rows with its current row.
 ///
 /// Fields are separated by commas, semicolons, tabs or blanks, according to most rows. Lines that begin with `#`, `%`
-/// or `//` are comments; those above the names, or above rows of numbers without names, are a preamble. Columns without
-/// names are called `1`, `2`, …. Numbers may have a decimal comma if commas are not separators; a time may be a clock
-/// time.
+/// or `//` are comments; comments above the names, or above rows of numbers without names, form a preamble. Columns
+/// without names are called `1`, `2`, …. Numbers may have a decimal comma if commas are not separators; a time may be a
+/// clock time.
 pub struct CsvFile {
     file: PathBuf,
     lines: Lines,
@@ -82,7 +82,7 @@ enum Cut {
 }
 
 impl CsvFile {
-    /// Opens a file and reads its header; for tagged rows, selects those with this tag.
+    /// Opens a file and reads its header; if the rows are tagged, selects the rows with this tag.
     pub fn open(file: &DataFile, tag: Option<&str>) -> Result<Self, FileError> {
         let stopped = |stop: Stop| stopped(file, &stop);
         let mut lines = Lines::open(source(file)?).map_err(stopped)?;
@@ -172,10 +172,7 @@ impl CsvFile {
         let clock = self.heading.clocks.get(column).copied().flatten();
         let number = match (clock, text.parse()) {
             (Some(clock), _) => clock.seconds(text),
-            (None, Err(_)) if self.heading.delimiter.leaves_commas() => {
-                text.replacen(',', ".", 1).parse().ok()
-            }
-            (None, number) => number.ok(),
+            (None, number) => number.ok().or_else(|| other_number(text)),
         };
         number.unwrap_or(f64::NAN)
     }
@@ -192,7 +189,12 @@ impl CsvFile {
 /// The error for a text whose first line shows another kind of file.
 fn not_rows(file: &DataFile, lines: &Lines, is_labelled: bool) -> Option<FileError> {
     let first = lines.ahead().next()?.text.trim_ascii_start();
+    let is_array = first.starts_with(b"[{") || first.trim_ascii_end() == b"[";
     let (found, advice) = match first.first()? {
+        b'[' if is_array => (
+            "a JSON array",
+            "Write each object in a line of its own, for example by jq -c '.[]' FILE > log.jsonl",
+        ),
         // Rows may be objects, one on each line.
         b'{' if first.len() == 1 || !is_labelled => (
             "JSON",
@@ -200,7 +202,7 @@ fn not_rows(file: &DataFile, lines: &Lines, is_labelled: bool) -> Option<FileErr
         ),
         0 => (
             "NUL bytes at its beginning",
-            "The log was not written, or its memory was erased: copy the log again.",
+            "The log was not written completely, or its memory was erased. Copy the log again.",
         ),
         _ => return None,
     };
@@ -240,10 +242,10 @@ impl Rows for CsvFile {
             if let Some((labelled, stream, sample)) = &mut self.labelled {
                 match sample.add(labelled, stream, &mut line.text) {
                     Added::Complete => {}
-                    Added::Part => continue,
+                    Added::Part | Added::Other => continue,
                     Added::Nothing => {
-                        let is_row = labelled.knows(&line.text) || line.comment().is_some();
-                        if !is_row && self.left_out.rows > 0 && line.is_ended {
+                        let is_comment = line.comment().is_some();
+                        if !is_comment && self.left_out.rows > 0 && line.is_ended {
                             self.left_out.add(line);
                         }
                         continue;
@@ -334,8 +336,10 @@ impl Rows for CsvFile {
     fn cut_off(&self, done: &str) -> Option<String> {
         let (file, line) = (self.file.display(), self.line);
         let what = match self.cut? {
-            Cut::Row => "is truncated (fields are missing), so turncal ignored it",
-            Cut::Number => &format!("has no line end, so its last number may lack digits. {done}"),
+            Cut::Row => "has too few fields because it is truncated, so turncal ignored it",
+            Cut::Number => {
+                &format!("has no line ending, so its last number may lack digits. {done}")
+            }
         };
         Some(format!(
             "The last row of {file} (line {line}) {what}. Check that the file is complete."
@@ -350,7 +354,7 @@ fn no_tag(path: &Path, tag: &str) -> FileError {
         Place::File,
         "rows of text",
         format_args!("a log with a stream `{tag}`"),
-        "Leave `stream` out, or name another file.",
+        "Omit `stream`, or name another file.",
     )
 }
 
@@ -400,13 +404,13 @@ fn malformed(file: &Path, line: u64, what: Malformed) -> FileError {
     let (found, expected, advice) = match what {
         Malformed::Quote => (
             "an unclosed quote".to_owned(),
-            "one row per line, with every quote closed".to_owned(),
-            "Remove the quote or close it.",
+            "one row per line, with every quotation mark closed".to_owned(),
+            "Remove the quotation mark, or close it.",
         ),
         Malformed::Columns => (
             "too many columns".to_owned(),
             format!("at most {MOST_COLUMNS} columns"),
-            "Is this the right file? Export the columns that are needed.",
+            "Is this the right file? Export only the columns that are needed.",
         ),
         Malformed::Field => (
             format!("a field longer than {} KiB", LONGEST_FIELD / 1024),

@@ -1,4 +1,4 @@
-//! A file of rows: on disk, as bytes in memory (for example in a browser), or as columns in memory.
+//! A file of rows on disk, as bytes in memory (for example in a browser), or as columns in memory.
 
 use std::fs::{self, File};
 use std::io::{self, Cursor, Read, Seek};
@@ -74,8 +74,8 @@ impl DataFile {
             } else {
                 "a device or pipe"
             };
-            let expected = "a regular file that can be read more than once";
-            let advice = "Save its output to a file and give that file.";
+            let expected = "a regular file, which can be read more than once";
+            let advice = "Save the output of this pipe or device to a file, and give the file.";
             return Err(FileError::of(self, found, expected, advice));
         }
         let file = File::open(self).map_err(|error| self.refused(&error))?;

@@ -1,8 +1,8 @@
-//! Logs to rows of numbers.
+//! Reading of logs as rows of numbers.
 //!
 //! A [`Source`] opens a file by its content: text ([`csv_file`]), or one of the binary formats of [`streams`], each of
-//! which provides streams of samples. Either gives [`LogRows`]; a [`clock`] turns their time stamps into seconds. This
-//! crate does not interpret the numbers.
+//! which provides streams of samples. Both kinds of file are read as [`LogRows`]; a [`clock`] turns their time stamps
+//! into seconds. This crate does not interpret the numbers.
 
 pub mod clock;
 pub mod csv_file;

@@ -9,7 +9,7 @@ use turncal_input::{FileColumn, FileError, Place};
 
 /// A file that provides rows of numbers in sequence.
 pub trait Rows {
-    /// The file name in errors.
+    /// The file name used in errors.
     fn file(&self) -> &Path;
 
     /// The names of the columns.
@@ -23,7 +23,7 @@ pub trait Rows {
         None
     }
 
-    /// Modifications of the values, one sentence each.
+    /// Remarks on modifications of the values, one sentence each.
     fn remarks(&self) -> &[String];
 
     /// Error of integrals of the accelerometer columns over any rows, in the column unit times s, from combining two
@@ -32,7 +32,7 @@ pub trait Rows {
         [0.0; 3]
     }
 
-    /// Advances to the next row and uses these columns of it; false at the end.
+    /// Advances to the next row, of which these columns are used; returns false at the end.
     fn advance(&mut self, used: &[usize]) -> Result<bool, FileError>;
 
     /// The number in a column of the row; NaN if missing.
@@ -69,18 +69,18 @@ pub trait Rows {
         false
     }
 
-    /// Remark on lines among the rows that are none.
+    /// Remark on lines between the rows that are not rows.
     fn left_out(&self) -> Option<String> {
         None
     }
 
-    /// Remark on a truncated end of the file, with the treatment of its last row.
+    /// Remark on a truncated end of the file, which says how its last row was treated.
     fn cut_off(&self, _done: &str) -> Option<String> {
         None
     }
 }
 
-/// A file at one of its rows, with the columns in use.
+/// A file of rows with its current row and the columns that are used.
 pub struct LogRows {
     rows: Box<dyn Rows>,
     used: Vec<usize>,
@@ -113,7 +113,7 @@ impl LogRows {
         Ok(place)
     }
 
-    /// Index of a column; a minus before its name reverses the sign of the values.
+    /// Index of a column; a minus sign before its name reverses the sign of the values.
     pub fn signed_column(&mut self, name: &str) -> Result<(usize, FileColumn), FileError> {
         let literal = self.header().iter().any(|known| known == name);
         let bare = name.strip_prefix('-').filter(|_| !literal);
@@ -124,7 +124,7 @@ impl LogRows {
         Ok((self.column(&column.name)?, column))
     }
 
-    /// Advances to the next row; false at the end.
+    /// Advances to the next row; returns false at the end.
     pub fn advance(&mut self) -> Result<bool, FileError> {
         self.rows.advance(&self.used)
     }
@@ -167,7 +167,7 @@ impl LogRows {
         )
     }
 
-    /// An error about the whole file.
+    /// An error that concerns the whole file.
     pub fn error(
         &self,
         found: impl Display,

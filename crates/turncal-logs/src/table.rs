@@ -15,10 +15,10 @@ pub struct Table {
 }
 
 impl Table {
-    /// Columns with their names; NaN marks a missing number. Errors call the table by `name`.
+    /// Columns with their names; NaN marks a missing number. Errors refer to the table by `name`.
     ///
     /// # Errors
-    /// [`FileError`] if the columns differ in length.
+    /// Returns [`FileError`] if the columns differ in length.
     pub fn new(
         name: impl AsRef<Path>,
         columns: Vec<(String, Vec<f64>)>,
@@ -33,7 +33,7 @@ impl Table {
                 columns[other].len(),
                 names[other]
             );
-            let advice = "Give columns of the same rows.";
+            let advice = "Give columns with the same number of rows.";
             return Err(FileError::of(&name, found, "columns of one length", advice));
         }
         Ok(Self {
@@ -53,7 +53,7 @@ impl Table {
         &self.names
     }
 
-    /// The rows from the first on.
+    /// The rows, starting with the first.
     pub fn rows(&self) -> TableRows {
         TableRows {
             table: self.clone(),
@@ -65,7 +65,7 @@ impl Table {
     }
 }
 
-/// A table at one of its rows.
+/// A table with its current row.
 pub struct TableRows {
     table: Table,
     /// Units of the columns; empty if not stated.

@@ -1,6 +1,8 @@
 //! Report on the biases of an instrument at rest against temperature.
 
+use super::calibration::in_order;
 use super::calibration::temperature::{curves, hysteresis, orders};
+use super::values;
 use crate::prelude::*;
 use turncal::calibration::{AtRest, Calibration, MeanAtRest};
 use turncal::run::Run;
@@ -12,15 +14,17 @@ pub fn document(at_rest: &AtRest, run: &Run, calibration: &Calibration) -> Docum
     let (outputs, thermal) = (&at_rest.outputs, &at_rest.thermal);
     let range = thermal.model.range.gyro;
     document.lead.push(format!(
-        "Run {name} stays in one attitude for {:.0} s while its temperature covers {:.1} to {:.1} °C. Such a recording \
-         can show only bias against temperature; the accelerometer values also contain the scale-factor error times \
-         gravity in this attitude.",
+        "In the run {name}, the instrument stays in one attitude for {:.0} s while the temperature changes from {:.1} \
+         to {:.1} °C. Such a recording can show only the biases as a function of temperature; the accelerometer \
+         values also contain the scale-factor error times gravity in this attitude.",
         run.recording.imu.duration(),
         range.lowest,
         range.highest
     ));
-    document.warnings.items.extend(calibration.warnings.clone());
-    document.both(orders(outputs.form(), thermal));
+    document.verdict = values::verdict(calibration);
+    document.findings = in_order(&calibration.findings);
+    document.brief.push(values::table(calibration).into());
+    document.brief.push(orders(outputs.form(), thermal).into());
     document.both(hysteresis(outputs.form(), thermal));
     let changes = |index: usize| {
         let means = at_rest.means.iter().filter(|(bias, _)| *bias == index);
@@ -52,7 +56,7 @@ fn residuals(at_rest: &AtRest) -> Plot {
     let heading = "Residuals of the biases against temperature";
     let panels = at_rest.means.iter().map(panel);
     Plot::new("residuals-temperature.svg", heading, (3, 260), panels).caption(
-        "Mean output over a block minus the polynomial with its rate term. If heating and cooling differ, the \
-         temperature sensor lags the instrument, or the instrument has hysteresis.",
+        "Mean output over a block of samples minus the polynomial with its rate term. If the heating and cooling \
+         curves differ, the temperature sensor lags the inertial sensor, or the instrument has hysteresis.",
     )
 }

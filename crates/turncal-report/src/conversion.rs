@@ -1,9 +1,9 @@
-//! A noise figure in every convention.
+//! Report on a noise figure in every convention.
 
 use crate::prelude::*;
 use turncal::noise::conventions::{Conversion, Figure};
 
-/// Interpretation of the figure, and one line per convention.
+/// States how the figure was interpreted, with one line per convention.
 pub fn document(conversion: &Conversion) -> Document {
     let Figure { value, convention } = conversion.given;
     let at = conversion

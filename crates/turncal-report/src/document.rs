@@ -1,4 +1,4 @@
-//! Report of a result as data: facts, tables, plots, findings. Renderers turn it into text, a page or
+//! The report on a result as data: facts, tables, plots and findings. Renderers convert the report to text, a page or
 //! JSON, independently of the kind of result.
 
 use serde_json::Value;
@@ -11,21 +11,21 @@ use turncal::calibration::{Finding, Word};
 pub struct Document {
     /// Title of the report.
     pub title: String,
-    /// Whether the result may be used, and a summary in one line.
+    /// Whether the result may be used, with a one-line summary.
     pub verdict: Option<(Word, String)>,
-    /// Method and data, a paragraph each.
+    /// Method and data, one paragraph each.
     pub lead: Vec<String>,
     /// Findings of a calibration, the most severe first.
     pub findings: Vec<Finding>,
-    /// One-screen version instead of the blocks; if empty, the blocks are shown.
+    /// Short version for one screen, shown instead of the blocks; if it is empty, the blocks are shown.
     pub brief: Vec<Block>,
     /// Cautions about using the figures.
     pub warnings: List,
     /// Conclusions from the figures, the most important first.
     pub conclusions: List,
-    /// Facts, tables and plots in order, each with whether only the page shows it.
+    /// Facts, tables and plots in order, each with a flag that is true if it is shown only on the page.
     pub blocks: Vec<(PageOnly, Block)>,
-    /// The figures by name, with the unit in the name; NaN is null.
+    /// The figures by name, with the unit in the name; NaN becomes null.
     pub data: Value,
     /// Auxiliary files by name, such as a table as CSV.
     pub files: Vec<(String, String)>,
@@ -49,7 +49,7 @@ pub enum Block {
     Text(String, String),
     /// Lines to copy verbatim, below a heading.
     Code(String, String),
-    /// Start of a section of details with this heading, up to the next one; collapsed on a page.
+    /// Start of a section of details with this heading; the section extends to the next one and is collapsed on a page.
     Fold(String),
 }
 
@@ -67,7 +67,7 @@ pub struct Facts {
 pub struct List {
     /// Subject.
     pub heading: String,
-    /// A sentence or two each.
+    /// Remarks of one or two sentences each.
     pub items: Vec<String>,
 }
 
@@ -80,7 +80,7 @@ pub struct Table {
     pub columns: Vec<String>,
     /// Sections of rows.
     pub sections: Vec<Vec<Vec<String>>>,
-    /// Notes on reading the table, a sentence each.
+    /// Notes on how to read the table, one sentence each.
     pub notes: Vec<String>,
     /// Columns that a narrow terminal omits, the least important last.
     pub optional: Vec<usize>,
@@ -210,7 +210,7 @@ impl Table {
         sections.into_iter().fold(self, Self::section)
     }
 
-    /// Adds a note on reading the table.
+    /// Adds a note on how to read the table.
     pub fn note(mut self, note: impl Into<String>) -> Self {
         self.notes.push(note.into());
         self
@@ -228,14 +228,14 @@ macro_rules! into_block {
 }
 into_block!(Facts, Table, Plot, List);
 
-/// A text that begins with a capital.
+/// The text with a capital first letter.
 pub fn capital(text: &str) -> String {
     let mut letters = text.chars();
     let first = letters.next().into_iter().flat_map(char::to_uppercase);
     first.chain(letters).collect()
 }
 
-/// Two objects of JSON as one.
+/// Merges two JSON objects.
 pub fn joined(mut one: Value, other: Value) -> Value {
     if let (Value::Object(one), Value::Object(other)) = (&mut one, other) {
         one.extend(other);

@@ -6,7 +6,7 @@ use turncal::number::{TIMES, readable, stated_axes, three_digits};
 
 pub use turncal::calibration::Group;
 
-/// A triad in the plural.
+/// The name of a triad in the plural.
 pub fn triad_name(sensor: Sensor) -> &'static str {
     match sensor {
         Sensor::Gyro => "gyros",
@@ -41,7 +41,7 @@ pub fn group_columns(of_rows: &str) -> Vec<String> {
     std::iter::once(of_rows.to_owned()).chain(columns).collect()
 }
 
-/// The suffix of a parameter name, such as `x` or `xy`.
+/// The last part of a parameter name, such as `x` or `xy`.
 pub fn axis_name(form: InstallationForm, index: usize) -> String {
     parameter_name(form, index)
         .and_then(|name| name.rsplit('.').next().map(str::to_owned))

@@ -1,4 +1,4 @@
-//! A document as files: a self-contained page, every figure, and further files.
+//! The files of a document: a self-contained page, every figure, and further files.
 
 use std::path::{Path, PathBuf};
 use std::{fs, io};
@@ -16,7 +16,7 @@ const STYLE: &str = include_str!("style.css");
 /// Letters of the longest number with σ and unit.
 const LONGEST: usize = 20;
 
-/// A file of a report that could not be written.
+/// Error for a file of a report that could not be written.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot write {path}: {source}. The directory must exist and be writable", path = path.display())]
 pub struct ReportError {
@@ -26,8 +26,8 @@ pub struct ReportError {
     pub source: io::Error,
 }
 
-/// The files of a document by name: `index.html`, which contains the figures and needs no other files or network, every
-/// figure as a separate SVG file, and further files of the document.
+/// The files of a document by name: `index.html`, which contains all figures and needs neither other files nor a
+/// network; every figure as a separate SVG file; and the further files of the document.
 pub fn files(document: &Document) -> Vec<(String, String)> {
     let page = ("index.html".to_owned(), page(document));
     let figures = document
@@ -40,7 +40,7 @@ pub fn files(document: &Document) -> Vec<(String, String)> {
 /// Writes the [`files`] of a document into an existing directory.
 ///
 /// # Errors
-/// [`ReportError`] if a file cannot be written.
+/// Returns [`ReportError`] if a file cannot be written.
 pub fn write(document: &Document, directory: &Path) -> Result<(), ReportError> {
     for (name, text) in files(document) {
         let path = directory.join(name);
@@ -49,7 +49,7 @@ pub fn write(document: &Document, directory: &Path) -> Result<(), ReportError> {
     Ok(())
 }
 
-/// The page: warnings first, then conclusions, then the other parts in order.
+/// The page, with warnings first, then conclusions, then the other parts in order.
 pub fn page(document: &Document) -> String {
     let parts = document
         .blocks

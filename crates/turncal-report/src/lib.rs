@@ -1,10 +1,10 @@
-//! Reports of results and their presentation.
+//! Reports on results, and their presentation.
 //!
-//! A result fills a [`Document`]: facts, tables, plots, findings, and its figures by name. Three renderers turn any
+//! A result fills a [`Document`]: facts, tables, plots, findings, and figures by name. Three renderers turn any
 //! document into text ([`terminal`]), a page with figures ([`write()`]) or JSON ([`json`]); they do not depend on
 //! calibration. A plot is also a value ([`plot`]), and one renderer draws all plots ([`svg`]).
 //!
-//! Nothing is estimated here, except quantities for display: differences, units, extremes.
+//! This crate estimates nothing except quantities for display, such as differences, units and extremes.
 //!
 //! To add a figure to a result, add a plot to its document:
 //!
@@ -39,6 +39,7 @@ pub mod check;
 pub mod conversion;
 pub mod experiment;
 mod group;
+mod ieee;
 pub mod lot;
 pub mod navigation;
 pub mod path;

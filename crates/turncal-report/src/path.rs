@@ -1,5 +1,7 @@
-//! Report on a path: expected σ and table time, the value of each move, what the path does not show, and whether it
-//! decides a specification.
+//! Report on a path: expected σ and table time, the value of each move, the errors that the path does not show, and
+//! whether a specification can be decided.
+
+mod shipped;
 
 use serde::Serialize;
 
@@ -11,6 +13,7 @@ use turncal::calibration::{
 use turncal::imu::{AXES, InstallationForm};
 use turncal::lot::{Check, Verdict};
 use turncal::simulation::Scenario;
+use turncal::study::design::Design;
 use turncal::study::navigation::MethodOutlook;
 use turncal::study::path::{Evaluation, PathStudy, Without};
 use turncal::turntable::{Moves, Rotation};
@@ -30,8 +33,10 @@ pub struct Report<'a> {
     pub moves: &'a [String],
     /// Expected results.
     pub evaluation: &'a Evaluation,
-    /// Limits of the specification to be decided by the calibration, if any.
+    /// Limits of the specification that the calibration must decide, if any.
     pub checks: Option<&'a [Check]>,
+    /// The design of the path, if it was designed.
+    pub design: Option<&'a Design>,
 }
 
 /// A combination of parameters or an error term that the path does not show.
@@ -64,6 +69,9 @@ impl Report<'_> {
             self.with
         )];
         document.both(self.groups());
+        if let Some(design) = self.design {
+            document.both(shipped::table(design));
+        }
         document.both(self.facts(&navigated));
         document.both(self.moves());
         document.both(table(&not_shown));
@@ -79,7 +87,7 @@ impl Report<'_> {
         let (word, text) = match (self.checks, self.not_decided().len(), unobserved) {
             (Some(_), 0, _) => (
                 Word::Pass,
-                "a unit at its nominal values passes every limit".to_owned(),
+                "a unit whose values are nominal passes every limit".to_owned(),
             ),
             (Some(checks), open, _) => (
                 Word::Undecided,
@@ -92,7 +100,7 @@ impl Report<'_> {
             (None, _, unobserved) => (
                 Word::UseWithCare,
                 format!(
-                    "σ of {} of parameters is still more than half of the prior",
+                    "the σ of {} of parameters is still more than half of the prior σ",
                     several(unobserved, "combination")
                 ),
             ),
@@ -159,10 +167,10 @@ impl Report<'_> {
         };
         let columns = cells!["", "move", "s"].into_iter();
         let columns = columns.chain(Group::all().map(Group::short));
-        let mut table = Table::new("σ without each move, divided by σ with all moves", columns)
+        let mut table = Table::new("σ without each move, divided by the σ with all moves", columns)
             .section(self.evaluation.without.iter().enumerate().map(row))
-            .note("A path without the move also lacks the dwell after it. Evaluate the shorter path before you use \
-                it.");
+            .note("If the move is left out of a path, the dwell after it is missing too. Evaluate a shortened path before you use \
+            it.");
         table.optional = vec![2];
         table
     }
@@ -244,6 +252,7 @@ impl Report<'_> {
             "without": without.collect::<Value>(),
             "not_shown": not_shown,
             "not_decided": self.checks.map(|_| self.not_decided()),
+            "same_time": self.design.map(shipped::data),
         })
     }
 }
@@ -263,8 +272,8 @@ fn table(all: &[NotShown]) -> Table {
     )
     .section(all.iter().map(row))
     .note(
-        "Combinations of parameters, and error terms that are not estimated, that keep more than half of their prior \
-         σ. Could change: RMS change, in σ, of the group most affected by a term of usual size.",
+        "Combinations of parameters, and error terms that are not estimated, whose σ stays above half of the prior \
+         σ. Could change: RMS change, in units of σ, of the group that a term of usual size affects most.",
     )
 }
 

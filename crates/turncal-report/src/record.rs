@@ -1,11 +1,13 @@
-//! Report on a calibration file, as it was written.
+//! Report on a calibration file, with the values as written in the file.
 
 use super::calibration::{cross_validation, in_order};
+use super::ieee;
 use super::prelude::*;
 use super::values;
 use turncal::calibration::Calibration;
 
-/// Verdict, findings, values and, beyond one screen, every parameter with its sources of uncertainty.
+/// Shows the verdict, the findings and the values; the long form also shows every parameter with its sources of
+/// uncertainty.
 pub fn document(calibration: &Calibration, name: &str) -> Document {
     let mut document = Document::new(name);
     document.verdict = values::verdict(calibration);
@@ -16,6 +18,7 @@ pub fn document(calibration: &Calibration, name: &str) -> Document {
     document.both(parameters(calibration));
     document.both(noise(calibration));
     document.both(terms(calibration));
+    document.both(ieee::table(calibration));
     document
 }
 

@@ -1,4 +1,4 @@
-//! Status of a calibration in progress, as a screen that is redrawn or as lines.
+//! Status of a calibration in progress, shown as a screen that is redrawn or as single lines.
 
 use std::collections::BTreeSet;
 
@@ -24,7 +24,7 @@ pub fn words(next: Move) -> String {
         Move::HalfTurn { axis, is_negative } => {
             let sign = if is_negative { "−" } else { "" };
             return format!(
-                "turn it slowly by 180° about {sign}{} (right-handed)",
+                "turn the instrument slowly by 180° about {sign}{} (right-handed)",
                 AXES[axis]
             );
         }
@@ -33,18 +33,24 @@ pub fn words(next: Move) -> String {
     let axes = AXES.iter().zip(&up).filter(|(_, part)| **part != 0.0);
     let axes: Vec<String> = axes.map(|(axis, part)| signed_axis(*axis, *part)).collect();
     match axes.iter().map(String::as_str).collect::<Vec<_>>()[..] {
-        ["x"] => "put it on its left side (x up)".to_owned(),
-        ["−x"] => "put it on its right side (x down)".to_owned(),
-        ["y"] => "stand it on its rear end (y up)".to_owned(),
-        ["−y"] => "stand it on its front end (y down)".to_owned(),
-        ["z"] => "lay it flat, top up (z up)".to_owned(),
-        ["−z"] => "lay it flat, upside down (z down)".to_owned(),
-        [_, _] => format!("hold it on an edge, {} both 45° up", axes.join(" and ")),
-        _ => format!("hold it on a corner, {} equally far up", axes.join(", ")),
+        ["x"] => "put the instrument on its left side (x up)".to_owned(),
+        ["−x"] => "put the instrument on its right side (x down)".to_owned(),
+        ["y"] => "stand the instrument on its rear end (y up)".to_owned(),
+        ["−y"] => "stand the instrument on its front end (y down)".to_owned(),
+        ["z"] => "lay the instrument flat, top up (z up)".to_owned(),
+        ["−z"] => "lay the instrument flat, upside down (z down)".to_owned(),
+        [_, _] => format!(
+            "hold the instrument on an edge, with {} both 45° up",
+            axes.join(" and ")
+        ),
+        _ => format!(
+            "hold the instrument on a corner, with {} equally far up",
+            axes.join(", ")
+        ),
     }
 }
 
-/// The screen: at most 80 columns, the state first, the next move last.
+/// The screen, with at most 80 columns; the state comes first and the next move last.
 pub fn screen(run: &Run, status: &Status, specification: Option<&Specification>) -> Vec<String> {
     let mut lines = vec![so_far(status), String::new()];
     match &status.expected {
@@ -73,7 +79,7 @@ pub fn screen(run: &Run, status: &Status, specification: Option<&Specification>)
     lines
 }
 
-/// The state after a dwell in one line.
+/// One line with the state after a dwell.
 pub fn line(status: &Status, dwell: usize) -> Option<String> {
     let rest = status.survey.rests.get(dwell)?;
     let up = check::way_up(rest.up.axis, rest.up.down);
@@ -169,7 +175,8 @@ fn calibrated(last: &InterimCalibration) -> String {
     format!("calibration of the first {time} s: {word}{codes}")
 }
 
-/// Findings about the rows, then those that restrict the use of the last calibration: the first sentence of each.
+/// The first sentence of each finding, with the findings about the rows first and then those that restrict the use of
+/// the last calibration.
 pub fn notes(run: &Run, status: &Status) -> Vec<String> {
     let mut findings = run.recording.doubts.clone();
     findings.extend(check::of_survey(&status.survey));
@@ -186,7 +193,7 @@ pub fn notes(run: &Run, status: &Status) -> Vec<String> {
 }
 
 /// Upward directions seen from above the sensor, in three layers of nine directions (z up, level, down); then the turns
-/// in both directions about each axis.
+/// both ways about each axis.
 fn coverage(status: &Status) -> Vec<String> {
     let mark = |done: bool| if done { '●' } else { '○' };
     let rests = status.survey.rests.iter();
@@ -222,7 +229,7 @@ fn coverage(status: &Status) -> Vec<String> {
     lines
 }
 
-/// The state as data: σ of each group, unobserved parameters and the next move.
+/// The state as data: the σ of each group, the parameters that are not observed, and the next move.
 pub fn data(status: &Status) -> Value {
     let attained = status.expected.as_ref().ok();
     let last = attained.and_then(|attained| attained.history.last());

@@ -22,7 +22,7 @@ const USUAL_WIDTH: usize = 80;
 /// Prefix of a finding: its code.
 const CODE: &str = "       ";
 
-/// One-screen form: verdict, findings in one or two lines each, and a few figures.
+/// The short form for one screen: the verdict, the findings in one or two lines each, and a few figures.
 pub fn brief(document: &Document, width: Option<usize>) -> String {
     let width = width.unwrap_or(USUAL_WIDTH);
     let mut head = vec![cut(&titled(document), width)];
@@ -104,8 +104,9 @@ fn cut(text: &str, width: usize) -> String {
     text.chars().take_while(fits).chain(['…']).collect()
 }
 
-/// The document as text: method, tables, and at the end, where a reader looks first, conclusions and warnings. Lines
-/// have at most `width` characters; without a width, as for a file or a pipe, each row and each sentence is one line.
+/// The document as text: the method, the tables and, at the end, where a reader looks first, the conclusions and
+/// warnings. Lines have at most `width` characters; without a width, as for a file or a pipe, each row and each
+/// sentence is one line.
 pub fn text(document: &Document, width: Option<usize>) -> String {
     let mut parts = vec![paragraphs(&[&document.title], width)];
     let verdict = document.verdict.as_ref();
@@ -150,7 +151,7 @@ fn laid(parts: Vec<Vec<String>>) -> String {
     printable(&lines.collect::<String>())
 }
 
-/// Lines of at most `width` characters, indented except for the first; preformatted text is unchanged.
+/// Breaks text into lines of at most `width` characters, all indented except the first; preformatted text is unchanged.
 pub fn wrapped(text: &str, indent: &str, width: Option<usize>) -> Vec<String> {
     let fits = |width: &usize| display_width(text) > *width;
     let Some(width) = width.filter(fits) else {

@@ -9,7 +9,7 @@ use turncal::calibration::{
 };
 use turncal::turntable::AxisError;
 
-/// An error term in words.
+/// The name of an error term in words.
 pub fn title(block: ErrorTerm) -> &'static str {
     match block {
         ErrorTerm::GaussMarkovBias => "Gauss–Markov biases",
@@ -31,7 +31,7 @@ pub fn unit(block: ErrorTerm) -> (&'static str, f64) {
     }
 }
 
-/// Rows of the parameter table; with errors if requested by `errors` and stated in the truth.
+/// Rows of the parameter table; the errors are included if `errors` is true and the truth states them.
 pub fn rows(
     auxiliary: &Auxiliary,
     truth: &BTreeMap<String, TermRecord>,
@@ -54,8 +54,8 @@ pub fn rows(
     auxiliary.estimated().filter_map(row).collect()
 }
 
-/// A row of the table of parameters: a value with its σ, which is zero if it is fixed; the ratio of prior to posterior
-/// σ; and, in a table with errors, its error if known.
+/// A row of the parameter table: a value with its σ (zero if the value is fixed), the ratio of prior to posterior σ
+/// and, in a table with errors, the error if it is known.
 pub fn parameter_row(
     name: String,
     unit: &str,
@@ -87,7 +87,7 @@ pub fn parameter_row(
     row
 }
 
-/// Prior σ divided by posterior σ, with a note if the parameter was not observed.
+/// Prior σ divided by posterior σ; a note is added if the parameter was not observed.
 pub fn improvement(prior: f64, posterior: f64) -> String {
     let ratio = prior / posterior;
     if !ratio.is_finite() {
@@ -119,7 +119,7 @@ pub fn explained(all: &[TermEvidence]) -> Table {
     let rows = [estimated, others].map(|terms| terms.into_iter().map(row));
     Table::new(
         "Evidence for each error term",
-        columns("term | present | σ grows | shown by this path"),
+        columns("term | present | σ ratio | shown by this path"),
     )
     .sections(rows)
     .note(
@@ -128,7 +128,7 @@ pub fn explained(all: &[TermEvidence]) -> Table {
          probabilities.",
     )
     .note(
-        "σ grows: σ with the term divided by σ without it, RMS over the parameters of the group with the largest \
+        "σ ratio: σ with the term divided by σ without it, RMS over the parameters of the group with the largest \
          ratio.",
     )
     .note(
@@ -153,7 +153,7 @@ fn presence(present: f64) -> String {
     }
 }
 
-/// The group whose σ grows most; a dash if none grows visibly.
+/// The group whose σ grows most; a dash if no σ grows visibly.
 fn growth(of: &TermEvidence) -> String {
     let groups = Group::all().zip(of.sigma_factors);
     let grown = groups.filter_map(|(group, factor)| Some((group, factor?)));

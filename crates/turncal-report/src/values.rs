@@ -100,7 +100,7 @@ fn cell(calibration: &Calibration, name: &str, size: f64) -> String {
     }
 }
 
-/// Whether the calibration can be used, and how many parameters were determined.
+/// Whether the calibration may be used, and how many parameters were determined.
 pub fn verdict(calibration: &Calibration) -> Option<(Word, String)> {
     let word = calibration.verdict.as_ref()?.word;
     let all = calibration.parameters.len() + calibration.undetermined().count();

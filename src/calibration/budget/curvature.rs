@@ -1,9 +1,9 @@
-//! Contribution of the model's curvature to a covariance.
+//! Contribution of the second-order terms of the model to a covariance.
 //!
-//! A linear filter assumes that `K C` is linear in the parameters. If a path leaves some parameters at
-//! their prior σ, squares and products of their errors affect the parameters that it determines: two angles of 200″
-//! shorten a row of the general form by 1 ppm, while a few turns determine its scale factor to 0.3 ppm. For errors of
-//! arc seconds, these terms are negligible.
+//! A linear filter assumes that `K C` is linear in the parameters. If a path leaves some parameters at their prior σ,
+//! the squares and products of the errors of these parameters affect the parameters that the path determines: two
+//! angles of 200″ shorten a row of the general form by 1 ppm, while a few turns determine its scale factor to 0.3 ppm.
+//! For errors of the order of arc seconds, these terms are negligible.
 
 use nalgebra::{Matrix3, Vector3};
 

@@ -1,10 +1,10 @@
 //! The uncertainty budget of an estimate: its covariance by source (JCGM 100:2008, JCGM 102:2011).
 //!
 //! The covariance of a filter is homogeneous of degree one in the variances of all sources together: priors, noise of
-//! the instrument, errors of the table, noise of each observation. The part of a source is therefore its variance times
-//! the derivative of the covariance with respect to this variance, and the parts add up to the covariance (Euler). The
-//! parts of effects between dwells come from one backward pass (Koopman and Shephard 1992), the part of the prior is
-//! exact, and the parts of sources at rest are finite differences of the chain.
+//! the instrument, errors of the table, and noise of each observation. The contribution of a source is therefore its
+//! variance times the derivative of the covariance with respect to this variance, and the contributions add up to the
+//! covariance (Euler). The contributions of effects between dwells come from one backward pass (Koopman and Shephard
+//! 1992), the contribution of the prior is exact, and those of sources at rest are finite differences of the chain.
 
 pub mod curvature;
 
@@ -40,7 +40,7 @@ const NOTHING: f64 = 1e-12;
 /// Covariance of an estimate by source.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Budget {
-    /// The part of each source; the sum is the covariance of the estimate.
+    /// The contribution of each source; their sum is the covariance of the estimate.
     pub parts: Vec<BudgetPart>,
 }
 
@@ -49,9 +49,9 @@ pub struct Budget {
 pub struct BudgetPart {
     /// The source.
     pub source: BudgetSource,
-    /// Part of the covariance of the parameters of both triads, in their units.
+    /// Contribution to the covariance of the parameters of both triads, in their units.
     pub covariance: ParameterMatrix,
-    /// Degrees of freedom of its variance (JCGM 100, G.4.2); infinite if the variance is stated.
+    /// Degrees of freedom of the variance of the source (JCGM 100, G.4.2); infinite if the variance is stated.
     pub degrees_of_freedom: f64,
 }
 
@@ -84,7 +84,7 @@ impl Budget {
     /// The budget of the estimate of an outcome.
     ///
     /// # Errors
-    /// [`CalibrationError`] if the problem is not the one of the outcome.
+    /// Returns [`CalibrationError`] if the outcome belongs to a different problem.
     pub fn new(problem: &Problem, outcome: &Outcome) -> Result<Self, CalibrationError> {
         let problem = &problem.with(|model| model.prior_sigma = outcome.model.prior_sigma);
         let by_source = of_chain(problem, outcome)?;
@@ -113,13 +113,13 @@ impl Budget {
         })
     }
 
-    /// The sum of all parts.
+    /// The sum of all contributions.
     pub fn covariance(&self) -> ParameterMatrix {
         self.parts.iter().map(|part| part.covariance).sum()
     }
 
     /// Degrees of freedom of the combined standard uncertainty of a parameter (Welch and Satterthwaite, JCGM 100,
-    /// G.4.1); infinite if infinite for all parts.
+    /// G.4.1); infinite if all contributions have infinite degrees of freedom.
     pub fn degrees_of_freedom(&self, parameter: usize) -> f64 {
         let of = |part: &BudgetPart| part.variance(parameter);
         let combined: f64 = self.parts.iter().map(of).sum();

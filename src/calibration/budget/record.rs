@@ -1,13 +1,13 @@
-//! A budget as stored in a calibration file.
+//! An uncertainty budget in the form stored in a calibration file.
 
 use serde::{Deserialize, Serialize};
 
 use crate::calibration::Budget;
 
-/// Standard uncertainties of the estimated parameters by source, in their order and units.
+/// Standard uncertainties of the estimated parameters by source, in the order and units of the parameters.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BudgetRecord {
-    /// Contribution of each source; their squares add up to the variances.
+    /// Contribution of each source; the sum of the squares of the contributions is the variance.
     pub sources: Vec<BudgetPartRecord>,
     /// Effective degrees of freedom; `None` if infinite.
     pub degrees_of_freedom: Vec<Option<f64>>,

@@ -21,7 +21,7 @@ pub enum BudgetSource {
     AttitudeAtRest,
     /// Turning at standstill, without a table.
     RotationAtRest,
-    /// Velocity at the first sample, and position in every dwell (distance of the IMU from the table centre).
+    /// Velocity at the first sample, and position in every dwell (because the IMU is not at the table centre).
     Place,
     /// Table position errors, independent at each position.
     TablePosition,

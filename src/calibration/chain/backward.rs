@@ -1,4 +1,4 @@
-//! The disturbance smoother through the chain: every disturbance, given all data.
+//! The disturbance smoother of the chain, which estimates every disturbance from all data.
 //!
 //! Source: Koopman and Shephard 1992, "Exact score for time series models in state space form", Biometrika 79(4), for
 //! the score; de Jong 1991, "The diffuse Kalman filter", Annals of Statistics 19(2), for the columns of the constants.
@@ -13,16 +13,16 @@ use super::links::Link;
 use super::states::States;
 use crate::calibration::Posterior;
 
-/// Moments of the disturbances of one event, given all data.
+/// Mean squares and variances of the disturbances of one event, given all data.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Moments {
     /// Derivative of −2 ln L with respect to the log variance of this event alone.
     pub slope: f64,
     /// Expected curvature of −2 ln L with respect to the log σ, from this event alone.
     pub curvature: f64,
-    /// Sum of the squared means of the disturbances, over their prior variance.
+    /// Sum of the squared means of the disturbances, divided by their prior variance.
     pub squares: f64,
-    /// Sum of the variances of the disturbances given all data, over their prior variance.
+    /// Sum of the variances of the disturbances, given all data, divided by their prior variance.
     pub unknown: f64,
     /// Number of disturbances.
     pub count: f64,
@@ -31,7 +31,8 @@ pub struct Moments {
 /// Moments of the disturbances of each event of each effect, given all data.
 pub struct Smoothed(pub BTreeMap<(Effect, usize), Moments>);
 
-/// Smoothing cumulants: mean given zero constants, effect of the constants, and precision.
+/// Smoothing cumulants: the mean for the case that all constants are zero, the effect of the constants, and the
+/// precision.
 pub struct Cumulants {
     pub mean: DVector<f64>,
     pub by_constants: DMatrix<f64>,
@@ -61,7 +62,7 @@ impl Cumulants {
 }
 
 impl Filtered<'_> {
-    /// Runs through the links backward; `visit` receives the number of each link with the cumulants of its rows and all
+    /// Runs backward through the links; passes to `visit` the number of each link and the cumulants of its rows and all
     /// later rows.
     pub fn backward(&self, mut visit: impl FnMut(usize, &Cumulants)) {
         let (n, c) = (self.chain.states.count, self.chain.constants.len());
@@ -152,7 +153,7 @@ impl Filtered<'_> {
         })
     }
 
-    /// Only the means of these states.
+    /// The means of these states, without covariances.
     pub fn means<'a>(
         &'a self,
         posterior: &Posterior,

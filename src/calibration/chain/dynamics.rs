@@ -23,7 +23,7 @@ pub struct Dynamics<'a> {
 }
 
 impl Dynamics<'_> {
-    /// Navigation errors at the end of a block per state at its beginning, one column each.
+    /// Navigation errors at the end of a block for a unit value of each state at its beginning, one column per state.
     pub fn by_states(&self, block: &Block) -> DMatrix<f64> {
         let mut by = DMatrix::zeros(NAVIGATION, self.states.count);
         by.columns_mut(0, NAVIGATION)
@@ -57,7 +57,7 @@ impl Dynamics<'_> {
         by
     }
 
-    /// Navigation errors at the end of a block per constant, one column each.
+    /// Navigation errors at the end of a block for a unit value of each constant, one column per constant.
     pub fn by_constants(&self, block: &Block) -> DMatrix<f64> {
         let mut by = DMatrix::zeros(NAVIGATION, self.constants.len());
         for (k, &constant) in self.constants.iter().enumerate() {
@@ -111,7 +111,7 @@ pub fn rates(block: &Block) -> SMatrix<f64, CONSTANTS, NAVIGATION> {
     rates
 }
 
-/// Navigation errors at the end of a block at rest, per rate and specific force.
+/// Navigation errors at the end of a block at rest, for unit rates and specific forces.
 pub fn driven_at_rest(block: &Block) -> SMatrix<f64, NAVIGATION, CONSTANTS> {
     let t = block.duration;
     SMatrix::from_fn(|row, constant| {

@@ -12,7 +12,7 @@ pub enum Effect {
     Noise(Source),
     /// Differences between recordings; their size is estimated.
     Difference(Group),
-    /// A rotation in a move that remains afterwards.
+    /// A slip: a rotation in a move that remains afterwards.
     Slip(Slip),
     /// An effect of stated size.
     Stated(BudgetSource),
@@ -28,7 +28,8 @@ pub enum Slip {
 }
 
 impl Effect {
-    /// Whether single events may be far larger than the others: moves, positions, steps of biases, slips.
+    /// Whether single events of this effect (moves, position errors, bias steps and slips) may be far larger than the
+    /// others.
     pub fn has_heavy_tails(self) -> bool {
         match self {
             Self::Slip(_) => true,
@@ -65,25 +66,25 @@ pub struct Sizes {
 }
 
 impl Sizes {
-    /// A copy with another variance of an effect.
+    /// A copy in which an effect has another variance.
     pub fn with(mut self, effect: Effect, factor: f64) -> Self {
         self.effects.insert(effect, factor);
         self
     }
 
-    /// A copy with another variance of an event.
+    /// A copy in which an event has another variance.
     pub fn with_event(mut self, effect: Effect, event: usize, factor: f64) -> Self {
         self.events.insert((effect, event), factor);
         self
     }
 
-    /// The factor of an event.
+    /// The variance factor of an event.
     pub fn of(&self, effect: Effect, event: usize) -> f64 {
         let of_effect = self.effects.get(&effect).copied().unwrap_or(1.0);
         of_effect * self.of_event(effect, event)
     }
 
-    /// The factor of an event divided by that of its effect.
+    /// The variance factor of an event, divided by that of its effect.
     pub fn of_event(&self, effect: Effect, event: usize) -> f64 {
         self.events.get(&(effect, event)).copied().unwrap_or(1.0)
     }
@@ -109,10 +110,11 @@ impl Sizes {
     }
 }
 
-/// Variance of the noise at rest in each dwell, relative to all dwells.
+/// Variance of the noise at rest in each dwell, relative to that of all dwells.
 ///
-/// A dwell with more motion than the others then does not raise their noise: with an inverse-gamma prior of the
-/// variance, the noise of a dwell is a draw from Student's t (Lange, Little, Taylor 1989, J. Am. Stat. Assoc. 84(408)).
+/// With this factor, a dwell with more motion than the others does not increase the noise of the others: with an
+/// inverse-gamma prior for the variance, the noise of a dwell follows Student's t distribution (Lange, Little, Taylor
+/// 1989, J. Am. Stat. Assoc. 84(408)).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dispersion(Vec<f64>);
 
@@ -129,7 +131,7 @@ impl Dispersion {
         (Self(factors), middle)
     }
 
-    /// The factor of a dwell.
+    /// The variance factor of a dwell.
     pub fn of(&self, dwell: usize) -> f64 {
         self.0.get(dwell).copied().unwrap_or(1.0)
     }

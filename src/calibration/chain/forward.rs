@@ -1,9 +1,9 @@
-//! The Kalman filter through the chain, with the constants as columns.
+//! The Kalman filter of the chain, with the constants as sensitivity columns.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::effects::{Dispersion, Sizes};
-use super::links::{Chain, Link};
+use super::links::{Chain, Link, Rows, Transition};
 use super::states::States;
 use crate::calibration::constants::Sites;
 use crate::calibration::{CalibrationError, Constant, Known, Posterior, Prior, Problem, Script};
@@ -14,7 +14,8 @@ const BLOCK: usize = 100;
 /// A filtered link.
 #[derive(Debug, Clone)]
 pub struct Passed {
-    /// States before the rows: mean given zero constants, effect of the constants, and covariance.
+    /// States before the rows are used: the mean for the case that all constants are zero, the effect of the constants,
+    /// and the covariance.
     pub mean: DVector<f64>,
     pub by_constants: DMatrix<f64>,
     pub covariance: DMatrix<f64>,
@@ -29,7 +30,8 @@ pub struct Passed {
 }
 
 /// The filter after a link: mean given zero constants, effect of the constants, and covariance of the states.
-struct Forward {
+#[derive(Debug, Clone)]
+pub struct Forward {
     mean: DVector<f64>,
     by_constants: DMatrix<f64>,
     covariance: DMatrix<f64>,
@@ -46,10 +48,10 @@ pub struct Filtered<'a> {
 }
 
 impl Chain {
-    /// Runs the filter with these sizes.
+    /// Runs the filter with these sizes of the effects.
     ///
     /// # Errors
-    /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
+    /// Returns [`CalibrationError::Diverged`] if a covariance is not positive definite.
     pub fn filter(&self, sizes: &Sizes) -> Result<Filtered<'_>, CalibrationError> {
         let mut forward = Forward::new(self.states.count, self.constants.len());
         let passed = self.links.iter().map(|link| forward.pass(link, sizes));
@@ -65,7 +67,7 @@ impl Chain {
     /// Information on the constants from a filter with these sizes, without keeping its links.
     ///
     /// # Errors
-    /// [`CalibrationError::Diverged`] if a part cannot be reduced, or a covariance is not positive definite.
+    /// Returns [`CalibrationError::Diverged`] if a part cannot be reduced, or a covariance is not positive definite.
     pub fn information(
         problem: &Problem,
         script: &Script,
@@ -87,7 +89,7 @@ impl Chain {
 
 impl Forward {
     /// The filter before the first link.
-    fn new(states: usize, constants: usize) -> Self {
+    pub fn new(states: usize, constants: usize) -> Self {
         Self {
             mean: DVector::zeros(states),
             by_constants: DMatrix::zeros(states, constants),
@@ -99,9 +101,23 @@ impl Forward {
     /// Filters one link.
     ///
     /// # Errors
-    /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
+    /// Returns [`CalibrationError::Diverged`] if a covariance is not positive definite.
     fn pass(&mut self, link: &Link, sizes: &Sizes) -> Result<Passed, CalibrationError> {
-        let transition = &link.transition;
+        let (seen, log_determinant) = self
+            .step(&link.transition, &link.rows, sizes)
+            .ok_or(CalibrationError::Diverged { time: link.time })?;
+        self.log_determinant += log_determinant;
+        Ok(seen)
+    }
+
+    /// Filters a transition and the rows after it; also returns the log-determinant of the innovation covariance.
+    /// `None` if this covariance is not positive definite.
+    pub fn step(
+        &mut self,
+        transition: &Transition,
+        rows: &Rows,
+        sizes: &Sizes,
+    ) -> Option<(Passed, f64)> {
         let mean = &transition.states * &self.mean + &transition.offset;
         let by_constants = &transition.states * &self.by_constants + &transition.constants;
         let mut covariance = &transition.states * &self.covariance * transition.states.transpose()
@@ -110,13 +126,11 @@ impl Forward {
             let factor = sizes.of(drive.effect, drive.event);
             covariance.gemm(factor, &drive.by, &drive.by.transpose(), 1.0);
         }
-        let (seen, log_determinant) = Passed::new(link, mean, by_constants, covariance)
-            .ok_or(CalibrationError::Diverged { time: link.time })?;
-        self.log_determinant += log_determinant;
+        let (seen, log_determinant) = Passed::new(rows, mean, by_constants, covariance)?;
         self.mean = &seen.mean + seen.across.tr_mul(&seen.innovations);
         self.by_constants = &seen.by_constants - seen.across.tr_mul(&seen.of_constants);
         self.covariance = &seen.covariance - seen.across.tr_mul(&seen.across);
-        Ok(seen)
+        Some((seen, log_determinant))
     }
 }
 
@@ -124,12 +138,11 @@ impl Passed {
     /// Also returns the log-determinant of the innovation covariance; `None` if this covariance is not positive
     /// definite.
     fn new(
-        link: &Link,
+        rows: &Rows,
         mean: DVector<f64>,
         by_constants: DMatrix<f64>,
         covariance: DMatrix<f64>,
     ) -> Option<(Self, f64)> {
-        let rows = &link.rows;
         let mut across = &rows.states * &covariance;
         let mut of_innovations = &across * rows.states.transpose();
         (0..rows.values.len()).for_each(|k| of_innovations[(k, k)] += 1.0);
@@ -158,7 +171,7 @@ impl Passed {
 }
 
 impl Filtered<'_> {
-    /// Information of all rows and the prior on the constants.
+    /// Information on the constants from all rows and the prior.
     pub fn known(&self, prior: &Prior) -> Known {
         let c = self.chain.constants.len();
         let mut known = Known::new(prior.clone());
@@ -188,7 +201,7 @@ impl Filtered<'_> {
         })
     }
 
-    /// Information of all rows on the constants.
+    /// Information on the constants from all rows.
     pub fn information(&self) -> DMatrix<f64> {
         let c = self.chain.constants.len();
         let mut information = DMatrix::zeros(c, c);

@@ -1,4 +1,4 @@
-//! Innovations of single observations, and the estimate against time, as a real-time filter would have it.
+//! Innovations of single observations, and the estimate as a function of time that a real-time filter would compute.
 
 use nalgebra::{DMatrix, DVector, Matrix3, SymmetricEigen};
 
@@ -23,11 +23,11 @@ struct Expected {
 }
 
 impl Filtered<'_> {
-    /// Innovations of all observations, each given the preceding observations, and the estimate after parts of dwells.
-    /// The sites give the prior of the constants that may be absent.
+    /// Innovations of all observations, each predicted from the preceding observations, and the estimate after parts of
+    /// dwells. `sites` gives the priors of the constants that may be absent.
     ///
     /// # Errors
-    /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
+    /// Returns [`CalibrationError::Diverged`] if a covariance is not positive definite.
     pub fn innovations(
         &self,
         (problem, script): (&Problem, &Script),

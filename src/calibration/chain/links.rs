@@ -12,7 +12,8 @@ use super::states::States;
 use crate::calibration::{CalibrationError, Constant, Problem, Script};
 pub use link::Link;
 use maker::Maker;
-use rows::Rows;
+pub use rows::Rows;
+pub use transition::Transition;
 
 /// The links of all stretches.
 #[derive(Debug, Clone)]
@@ -22,7 +23,7 @@ pub struct Chain {
     pub links: Vec<Link>,
     /// Number of scalars that were observed.
     pub observations: usize,
-    /// 1σ of the slip in one move, divided by that of a position.
+    /// 1σ of the slip in one move, divided by the 1σ of a table position.
     pub slip: f64,
     /// Sum of squares of the observations within parts that does not depend on states or constants.
     pub squares: f64,
@@ -31,7 +32,7 @@ pub struct Chain {
 }
 
 impl Chain {
-    /// A copy without the rows of some dwells, given by number.
+    /// A copy without the rows of the dwells with these numbers.
     pub fn observed_in(mut self, used: impl Fn(usize) -> bool) -> Self {
         let (n, c) = (self.states.count, self.constants.len());
         for link in self.links.iter_mut().filter(|link| !used(link.dwell)) {
@@ -40,10 +41,10 @@ impl Chain {
         self
     }
 
-    /// The links of a problem, from its events at one linearisation point, with this dispersion of the dwells.
+    /// The links of a problem, made from its events at one linearisation point, with this dispersion of the dwells.
     ///
     /// # Errors
-    /// [`CalibrationError::Diverged`] if a part of a dwell cannot be reduced.
+    /// Returns [`CalibrationError::Diverged`] if a part of a dwell cannot be reduced.
     pub fn new(
         problem: &Problem,
         script: &Script,

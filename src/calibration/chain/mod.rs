@@ -1,10 +1,10 @@
-//! The chain of dwells: information from the parts of dwells, and the moves between them.
+//! The chain of dwells, which combines the information from the parts of dwells with the moves between them.
 //!
-//! Within a part of a dwell, only the noise at rest acts; [`links`] reduces each part once to rows in its initial
-//! states and the constants. Between parts, the states change through moves, table positions and varying biases: a
-//! chain of links, which [`forward`] filters with the constants as sensitivity columns (Friedland 1969, "Treatment of
-//! bias in recursive filtering", IEEE Trans. Automatic Control 14(4)) and [`backward`] smooths. Changing the size of an
-//! effect needs no new pass over the samples.
+//! Within a part of a dwell, noise at rest is the only disturbance; [`links`] reduces each part once to rows in its
+//! initial states and the constants. Between parts, moves, table positions and varying biases change the states. The
+//! parts form a chain of links, which [`forward`] filters with the constants as sensitivity columns (Friedland 1969,
+//! "Treatment of bias in recursive filtering", IEEE Trans. Automatic Control 14(4)) and [`backward`] smooths. If the
+//! size of an effect changes, the samples need not be processed again.
 
 mod backward;
 mod dynamics;
@@ -19,8 +19,9 @@ mod without;
 
 pub use backward::{Moments, Smoothed};
 pub use effects::{Dispersion, Effect, Sizes, Slip};
-pub use forward::Filtered;
-pub use links::Chain;
+pub use forward::{Filtered, Forward};
+pub use links::{Chain, Link, Rows, Transition};
+pub use states::States;
 
 #[cfg(test)]
 mod tests;

@@ -1,13 +1,14 @@
-//! Reduction of a part of a dwell, with only the noise at rest, to whitened rows of the states at its beginning.
+//! Reduces a part of a dwell, in which noise at rest is the only disturbance, to whitened equations for the states at
+//! the beginning of the part.
 //!
-//! At rest the parameters act through three constant rates and three constant specific forces. Given these and the
-//! states at the beginning (together `g`), only noise remains. A filter of the moving states whitens it in each
-//! observation. The whitened observations and the states at the end are linear in `g`: together they contain all
+//! At rest, the parameters act through three constant rates and three constant specific forces. If these and the states
+//! at the beginning (together `g`) are given, only noise remains. A filter of the moving states whitens this noise in
+//! each observation. The whitened observations and the states at the end are linear in `g`: together they contain all
 //! information of the part (Friedland 1969, "Treatment of bias in recursive filtering", IEEE Trans. Automatic Control
 //! 14(4)).
 //!
-//! In addition to the navigation errors, an attitude is observed: by hand, the rotation since the body came to rest;
-//! after a table move, the attitude error minus the fading settling of the table.
+//! In addition to the navigation errors, an attitude is observed: for a recording by hand, the rotation since the body
+//! came to rest; after a table move, the attitude error minus the fading settling error of the table.
 
 mod course;
 
@@ -33,14 +34,14 @@ pub struct Part {
     pub log_determinant: f64,
     /// Number of scalars that were observed.
     pub count: usize,
-    /// Moving states at the end: rows of `g`, offset, covariance.
+    /// States that change within the part, at its end: rows in `g`, offset and covariance.
     pub of_given: DMatrix<f64>,
     pub offset: DVector<f64>,
     pub covariance: DMatrix<f64>,
 }
 
 impl Part {
-    /// A copy with all noise variances multiplied by a factor.
+    /// A copy in which all noise variances are multiplied by a factor.
     pub fn dispersed(mut self, factor: f64) -> Self {
         let root = factor.sqrt();
         self.measured /= root;
@@ -54,13 +55,13 @@ impl Part {
 
 /// An observation, whitened by its covariance given `g`.
 pub struct Whitened<'a> {
-    /// Number among the observations of the part.
+    /// Number of the observation within the part.
     pub number: usize,
-    /// Three scalars with σ = 1, given `g = 0`.
+    /// The three scalars for `g = 0`, each with σ = 1.
     pub scalars: Vector3<f64>,
     /// Lower triangular root of the covariance of the three components.
     pub root: &'a Matrix3<f64>,
-    /// Rows of `g` of the three scalars, one after the other.
+    /// Coefficients of `g` in the three scalars, one row after the other.
     pub rows: &'a [f64],
 }
 
@@ -69,7 +70,8 @@ pub trait PartFilter {
     /// Size of `g`.
     fn given(&self) -> usize;
 
-    /// The reduction of a part; `None` if a covariance is not positive definite. `seen` receives each observation.
+    /// The reduction of a part; `None` if a covariance is not positive definite. The callback `seen` receives each
+    /// observation.
     fn reduce(
         &mut self,
         part: (&Rest, &Stretch),
@@ -78,7 +80,7 @@ pub trait PartFilter {
     ) -> Option<Part>;
 }
 
-/// The filters for this number of moving states: one for parts that follow a move, one for other parts.
+/// The filters for this number of changing states: one for parts that follow a move, and one for other parts.
 pub fn part_filters(moving: usize) -> [Box<dyn PartFilter>; 2] {
     let begins = begins(moving).into_iter().enumerate();
     if moving == NAVIGATION {
@@ -97,7 +99,7 @@ pub fn filter_of(rest: &Rest) -> usize {
     usize::from(!(rest.first && rest.new_position))
 }
 
-/// The moving states in `g`; position is not among them, because nothing in a dwell depends on it.
+/// The states in `g` that change within the part; position is not among them, because nothing in a dwell depends on it.
 pub fn begins(moving: usize) -> Vec<usize> {
     let is_position = |state: &usize| (POSITION..POSITION + 3).contains(state);
     (0..moving).filter(|state| !is_position(state)).collect()

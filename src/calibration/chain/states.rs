@@ -27,9 +27,9 @@ pub struct States {
     pub slips: Option<[usize; 2]>,
     /// Deviation of the biases of each triad from their mean.
     pub biases: PerSensor<usize>,
-    /// Error of Earth rate, without a table.
+    /// Error of Earth rate; `None` with a table.
     pub earth_rate: Option<usize>,
-    /// Gravity error, if there are several sites.
+    /// Gravity error; `None` unless there are several sites.
     pub gravity: Option<usize>,
     /// Disturbance of the magnetic field in a dwell, with a magnetometer.
     pub magnetic: Option<usize>,
@@ -73,7 +73,7 @@ impl States {
         }
     }
 
-    /// The rotation at rest, without a table.
+    /// Index of the rotation at rest; `None` with a table.
     pub fn turn(&self) -> Option<usize> {
         (self.moving > NAVIGATION).then_some(NAVIGATION)
     }

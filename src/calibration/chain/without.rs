@@ -1,4 +1,4 @@
-//! The information of each move on the constants.
+//! The information on the constants that each move contributes.
 
 use nalgebra::DMatrix;
 
@@ -14,8 +14,8 @@ impl Filtered<'_> {
     /// unknown.
     ///
     /// With such a disturbance δ, the information on the constants is `Λ − Eᵀ (N + W⁻²)⁻¹ E`, where N is the
-    /// information on δ, and E that on both, from all later rows (de Jong 1991, "The diffuse Kalman filter", Annals of
-    /// Statistics 19(2)).
+    /// information on δ from all later rows, and E the joint information on δ and the constants (de Jong 1991, "The
+    /// diffuse Kalman filter", Annals of Statistics 19(2)).
     pub fn without_moves(&self, posterior: &Posterior) -> Vec<ParameterVector> {
         let mut sigma = Vec::new();
         self.backward(|number, cumulants| {

@@ -1,4 +1,4 @@
-//! Single events that stand out: a wrong position, a move, a velocity, a step of a bias, a slip.
+//! Detection of single unusual events: a wrong position, move or velocity, a bias step, or a slip.
 
 use std::collections::BTreeMap;
 
@@ -32,20 +32,20 @@ pub enum EventKind {
     Field,
 }
 
-/// An event too large to be produced by its effect by chance, in spite of the heavy tails.
+/// An event that is too large to result from its effect by chance, even if the effect has a heavy-tailed distribution.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Event {
     /// Kind.
     pub kind: EventKind,
-    /// Number, from zero, of the dwell that the event concerns or precedes.
+    /// Number, from zero, of the dwell that contains or follows the event.
     pub dwell: usize,
-    /// End of the first part of that dwell, s.
+    /// End of the first part of this dwell, s.
     pub time: f64,
-    /// Size, in rad, m/s, rad/s, m/s² or parts of the local field.
+    /// Size of the event, in rad, m/s, rad/s, m/s² or parts of the local field.
     pub size: f64,
     /// −2 ln of the p-value.
     pub significance: f64,
-    /// The limit of the significance at a false-alarm rate of 0.1 % over all events.
+    /// Limit of the significance, for a false-alarm rate of 0.1 % over all events.
     pub limit: f64,
 }
 
@@ -189,23 +189,24 @@ impl EventKind {
             Self::Position => (
                 Kind::PositionWrong,
                 format!(
-                    "The table readings in dwell {number} are wrong by {angle} (at {time:.1} s). turncal gave these \
-                     readings next to no weight. Check the table log there for a bump or a wrong reading"
+                    "The table readings in dwell {number} (at {time:.1} s) are wrong by {angle}. turncal gave these \
+                     readings next to no weight. Check the table log around this time for a bump or a wrong reading"
                 ),
             ),
             Self::Move => (
                 Kind::MoveWrong,
                 format!(
-                    "In the move before dwell {number} (at {time:.1} s) the gyros missed a turn of {angle}. turncal \
-                     estimated this angle. Check the log there for lost samples, an exceeded range or a loose mount"
+                    "In the move before dwell {number} (at {time:.1} s), the gyros missed a turn of {angle}. turncal \
+                     estimated this angle. Check the log around this time for lost samples, rates beyond the \
+                     measuring range, or a loose mount"
                 ),
             ),
             Self::Velocity => (
                 Kind::VelocityWrong,
                 format!(
-                    "In the move before dwell {number} (at {time:.1} s) the accelerometers missed a velocity of \
-                     {size:.2e} m/s. turncal estimated this velocity. Check the log there for lost samples, an \
-                     exceeded range or a bump"
+                    "In the move before dwell {number} (at {time:.1} s), the accelerometers missed a velocity of \
+                     {size:.2e} m/s. turncal estimated this velocity. Check the log around this time for lost \
+                     samples, forces beyond the measuring range, or a bump"
                 ),
             ),
             Self::BiasStep(sensor) => {
@@ -217,9 +218,9 @@ impl EventKind {
                 (
                     Kind::BiasStep,
                     format!(
-                        "Before dwell {number} (at {time:.1} s) the {sensor} biases changed by about {} {name}. \
-                         The calibration contains the mean bias over the recording. Check the log there for a shock or \
-                         a jump of temperature or supply",
+                        "Before dwell {number} (at {time:.1} s), the {sensor} biases changed by about {} {name}. \
+                         The calibration contains the mean bias over the recording. Check the log around this time \
+                         for a shock, or for a sudden change of temperature or supply voltage",
                         three_digits(size)
                     ),
                 )
@@ -241,9 +242,9 @@ impl EventKind {
                 (
                     Kind::Slipped,
                     format!(
-                        "Before dwell {number} (at {time:.1} s) {what} by {angle}. turncal estimated this angle; the \
-                         misalignments refer to the mounting before that. Fasten the instrument and the table, and \
-                         repeat the recording"
+                        "Before dwell {number} (at {time:.1} s), {what} by {angle}. turncal estimated this angle; the \
+                         misalignments refer to the mounting before this event. Fasten the instrument and the table, \
+                         and repeat the recording"
                     ),
                 )
             }

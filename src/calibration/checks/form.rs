@@ -13,7 +13,7 @@ use crate::statistics::{FALSE_ALARM, chi_square_limit};
 /// The likelihood ratio of a restricted misalignment form against the general one.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct FormTest {
-    /// Decrease of the cost, −2 ln of likelihood and prior, if the general form is allowed.
+    /// Decrease of the cost (−2 ln of the product of likelihood and prior) if the general form is allowed.
     pub gain: f64,
     /// Number of additional angles of the general form.
     pub angles: usize,
@@ -45,12 +45,12 @@ impl FormTest {
     }
 }
 
-/// Tests the form of an estimate against the general form, linearised there (Van Trees, *Detection, Estimation, and
-/// Modulation Theory*, part I, §2.5). `None` for a form with as many angles as the general form, because no data can
-/// reject it.
+/// Tests the form of an estimate against the general form, linearised at this estimate (Van Trees, *Detection,
+/// Estimation, and Modulation Theory*, part I, §2.5). `None` for a form with as many angles as the general form,
+/// because no data can reject it.
 ///
 /// # Errors
-/// [`CalibrationError::Diverged`] if a covariance is not positive definite.
+/// Returns [`CalibrationError::Diverged`] if a covariance is not positive definite.
 pub fn form_test(problem: &Problem, solved: &Solved) -> Result<Option<FormTest>, CalibrationError> {
     let general = InstallationForm::General;
     let angles = |form: InstallationForm| 2 * form.angle_names().len();

@@ -50,13 +50,14 @@ pub struct Innovation {
     pub time: f64,
     /// Kind of observation.
     pub observation: Observation,
-    /// East, North and Up in units of their own σ, independent of each other.
+    /// East, North and Up components, each divided by its own σ; the three are independent.
     pub whitened: [f64; 3],
     /// σ of the three components, rad or m/s.
     pub sigma: [f64; 3],
-    /// Number of its dwell.
+    /// Number of the dwell that contains the observation.
     pub dwell: usize,
-    /// Whether the innovation shows the errors of the move before its dwell; false if rows are missing in between.
+    /// Whether the innovation shows the errors of the move before its dwell; false if rows are missing between move and
+    /// dwell.
     pub after_move: bool,
 }
 
@@ -81,7 +82,7 @@ pub struct Consistency {
 }
 
 impl Consistency {
-    /// The kinds of observation that were made.
+    /// The kinds of observation that occurred.
     pub fn kinds(&self) -> impl Iterator<Item = (Observation, Nis)> {
         let each = [self.velocity, self.table, self.attitude];
         let all = Observation::ALL.into_iter().zip(each);
@@ -108,17 +109,17 @@ type Squares = fn(&[&Innovation]) -> Vec<f64>;
 /// Innovations that are tested separately: text that follows the kind of observation, the causes to check if the
 /// innovations are large, and their squares.
 const LOOKS: [(&str, &str, &str, Squares); 3] = [
-    ("all", "", "the white noise in [imu.noise]", of_all),
+    ("all", "", "the white noise figures in [imu.noise]", of_all),
     (
         AFTER_MOVES,
         " first after each move",
-        "the noise of moves and of the table position, the time stamps and --with time-offset",
+        "the noise of moves, the table position, the time stamps and --with time-offset",
         after_moves,
     ),
     (
         "over-dwells",
         " summed over each dwell",
-        "the bias variation in [imu.noise], or add --temperature if biases follow the temperature",
+        "the bias variation in [imu.noise]; if the biases follow the temperature, add --temperature",
         over_dwells,
     ),
 ];
@@ -148,8 +149,8 @@ fn over_dwells(innovations: &[&Innovation]) -> Vec<f64> {
     summed.collect()
 }
 
-/// The finding on innovations that do not agree with their covariance, if any. `pulses` are the kinds of observation
-/// that contain remainders of pulses.
+/// The finding on innovations that do not agree with their covariance, if there is one. `pulses` are the kinds of
+/// observation that contain remainders of pulses.
 pub fn inconsistent(innovations: &[Innovation], pulses: &[Observation]) -> Option<Finding> {
     let of = |kind| innovations.iter().filter(move |i| i.observation == kind);
     let kinds = Observation::ALL.map(|kind| (kind, of(kind).collect::<Vec<_>>()));
@@ -188,7 +189,9 @@ pub fn inconsistent(innovations: &[Innovation], pulses: &[Observation]) -> Optio
         }
     }
     let text = format!(
-        "Residuals are not of the size that their σ predict. Relative to it they are: {}. Check {}.",
+        "The size of the residuals does not agree with their predicted σ. Relative to the predicted size, the \
+         residuals are: {}. Check \
+         {}.",
         each.join("; "),
         causes.join("; ")
     );
@@ -232,9 +235,9 @@ fn nis<'a>(innovations: impl Iterator<Item = &'a Innovation>) -> Nis {
     }
 }
 
-/// The interval outside which the mean of `count` squared standard normal numbers lies with probability
-/// `outside`, half on each side (Bar-Shalom, Li, Kirubarajan, *Estimation with Applications to
-/// Tracking and Navigation*, §5.4.2). NaN if there are none.
+/// The interval outside which the mean of `count` squared standard normal numbers lies with probability `outside`, half
+/// on each side (Bar-Shalom, Li, Kirubarajan, *Estimation with Applications to Tracking and Navigation*, §5.4.2). NaN
+/// if there are no numbers.
 pub fn mean_square_interval(count: usize, outside: f64) -> (f64, f64) {
     let n = count as f64;
     ChiSquared::new(n).map_or((f64::NAN, f64::NAN), |chi2| {

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use crate::calibration::{Finding, FindingKind as Kind};
 use crate::run::motion::LabelCheck;
 
-/// The finding on sections whose labels the recording contradicts, if any.
+/// The finding on sections whose labels are contradicted by the recording, if there are any.
 pub fn contradicted(contradicted: &[LabelCheck]) -> Option<Finding> {
     let each: Vec<String> = contradicted.iter().map(LabelCheck::to_string).collect();
     let text = format!(
@@ -24,11 +24,11 @@ pub fn contradicted(contradicted: &[LabelCheck]) -> Option<Finding> {
     (!contradicted.is_empty()).then(|| Finding::new(Kind::LabelsContradicted, text, figures))
 }
 
-/// The finding on labelled sections with missing parts, if any.
+/// The finding on labelled sections with missing rows, if there are any.
 pub fn lost(labels: &[String]) -> Option<Finding> {
     let text = format!(
-        "Part of a labelled section is missing from the log, so turncal skipped section {}. Record the section again, \
-         or remove it from [segments].",
+        "Some rows of a labelled section are missing from the log, so turncal skipped section {}. Record this section \
+         again, or remove its label from [segments].",
         labels.join(", ")
     );
     let figures = json!({ "labels": labels });

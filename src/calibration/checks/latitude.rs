@@ -1,4 +1,4 @@
-//! Test whether the gyros sense the Earth rate of the stated latitude.
+//! Tests whether the gyros sense the Earth rate of the stated latitude.
 
 use nalgebra::Vector3;
 use serde_json::json;
@@ -15,7 +15,7 @@ use crate::units::{DEG_PER_H, DEGREE, PPM};
 /// Gravity of a wrong latitude makes accelerometer scale factors useless beyond this many σ.
 const USELESS: f64 = 4.0;
 
-/// The finding, if Earth rate is not that of the stated latitude.
+/// The finding, if the sensed Earth rate is not that of the stated latitude.
 pub fn earth_rate(problem: &Problem, outcome: &Outcome) -> Option<Finding> {
     let candidates = &outcome.solved.effects.candidates;
     let count = candidates.absent().count();
@@ -65,8 +65,8 @@ pub fn earth_rate(problem: &Problem, outcome: &Outcome) -> Option<Finding> {
 
 fn of_north(north: f64) -> String {
     format!(
-        "The north of the table is off by {}°: the gyros sense Earth rate {} of it. turncal estimated Earth rate, so \
-         K, E and D do not depend on it. Correct the azimuth of the table.",
+        "The north of the table is off by {}°: the gyros sense the north of Earth rate {} of the stated north. \
+         turncal estimated Earth rate, so K, E and D do not depend on this error. Correct the azimuth of the table.",
         value(north.abs() / DEGREE, 0.01),
         if north > 0.0 { "east" } else { "west" }
     )
@@ -86,8 +86,8 @@ fn of_latitude(latitudes: [f64; 2], (off, sigmas): (f64, f64)) -> String {
         String::new()
     };
     format!(
-        "The gyros sense the Earth rate of latitude {sensed}°, but {stated}° is stated. turncal estimated Earth \
-         rate{gravity}. Check latitude_deg and the north and level of the table."
+        "The gyros sense the Earth rate of latitude {sensed}°, but the stated latitude is {stated}°. turncal \
+         estimated Earth rate{gravity}. Check latitude_deg and the north and level of the table."
     )
 }
 

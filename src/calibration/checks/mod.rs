@@ -24,7 +24,7 @@ use finding::Finding;
 use term::TermEvidence;
 
 /// Findings of all checks of a filter outcome; causes come before their possible consequences. `problem` is the problem
-/// as stated.
+/// as it was stated.
 pub fn findings(problem: &Problem, outcome: &Outcome) -> Vec<Finding> {
     let (estimate, innovations) = (&outcome.estimate, &outcome.innovations);
     let rounding = rounding::by_rounding(problem, &estimate.triads);

@@ -35,7 +35,7 @@ pub fn far_from_prior(model: &Model, estimate: &Estimate) -> Option<Finding> {
     let (words, causes): (Vec<String>, Vec<Value>) =
         causes(&far, &estimate.triads).into_iter().unzip();
     let text = format!(
-        "These parameters are more than {CONTRADICTS} σ from the prior in [imu.prior]: {}. Likely cause: {}.",
+        "These parameters are more than {CONTRADICTS} prior σ from their prior values in [imu.prior]: {}. Likely cause: {}.",
         each.join(", "),
         words.join("; ")
     );
@@ -60,10 +60,10 @@ fn is_another_scale(model: &Model, estimate: &Estimate, index: usize) -> bool {
 
 /// The finding on parameters for which the data alone contradict the prior, if the estimate includes the prior.
 ///
-/// A prior that is too tight constrains the estimate, so the distance of the estimate alone is not informative. With
-/// `P⁻¹ = S⁻¹ + V⁻¹` of prior and data, the distance of the estimate is `P V⁻¹` times that of the data, and its
-/// covariance for a correct prior is `P S⁻¹ P V⁻¹ = S − P`: normalised, it equals the distance of data and prior over
-/// both σ.
+/// If the prior is too tight, it constrains the estimate, so the distance of this estimate from the prior is not
+/// informative. With `P⁻¹ = S⁻¹ + V⁻¹` (S for the prior, V for the data), the distance of the estimate is `P V⁻¹` times
+/// that of the data. For a correct prior, its covariance is `P S⁻¹ P V⁻¹ = S − P`. Normalised, it thus equals the
+/// distance between data and prior relative to both σ.
 pub fn far_by_data(model: &Model, estimate: &Estimate) -> Option<Finding> {
     let mut by_data = estimate.vector();
     let mut sigma = estimate.sigma();
@@ -85,8 +85,8 @@ pub fn far_by_data(model: &Model, estimate: &Estimate) -> Option<Finding> {
 }
 
 /// The model with a prior widened so that its estimate does not contradict it: σ of every parameter is at least its
-/// distance. `None` if nothing contradicts the prior. With a wrong prior, correct observations would become outliers,
-/// and the error of the prior would become noise.
+/// distance. `None` if no parameter contradicts the prior. With a wrong prior, correct observations would become
+/// outliers, and the error of the prior would be taken for noise.
 pub fn widened(model: &Model, estimate: &Estimate) -> Option<Model> {
     let off = estimate.vector() - model.prior_mean;
     let known: Vec<usize> = estimate
@@ -136,7 +136,7 @@ fn causes(far: &[usize], triads: &PerSensor<Triad>) -> Vec<Cause> {
     let biases = biases.map(|sensor| {
         let sensor = sensor.name();
         let words = format!(
-            "the stated {sensor} bias or bias_sigma does not fit the instrument (a register offset belongs in bias)"
+            "the stated {sensor} bias or bias_sigma does not fit the instrument (include a register offset in bias)"
         );
         (words, json!({ "cause": "bias", "sensor": sensor }))
     });
@@ -155,7 +155,7 @@ fn of_scales(of: Sensor, scale: &Vector3<f64>, far: &[usize], count: usize) -> C
     if !reversed.is_empty() {
         let axes = reversed.join(", ");
         let words = format!(
-            "{sensor} {axes} is reversed (put a minus before the column name in columns of [imu])"
+            "{sensor} {axes} is reversed (put a minus sign before the column name in columns of [imu])"
         );
         let figures = json!({ "cause": "reversed", "sensor": sensor, "axes": reversed });
         return (words, figures);
@@ -194,8 +194,8 @@ fn of_installation(triads: &PerSensor<Triad>, far: PerSensor<bool>) -> Vec<Cause
     if far.gyro && far.accel && alike(&turn(Sensor::Gyro), &common) {
         let angle_deg = common.norm() / DEGREE;
         let words = format!(
-            "both triads are rotated together by {angle_deg:.3}° (check the instrument mount, the zero, level and \
-             north of the table, and the labels)"
+            "both triads are rotated together by {angle_deg:.3}° (check how the instrument is mounted, the zero, \
+             level and north of the table, and the labels)"
         );
         return vec![(words, json!({ "cause": "mount", "angle_deg": angle_deg }))];
     }
@@ -203,15 +203,15 @@ fn of_installation(triads: &PerSensor<Triad>, far: PerSensor<bool>) -> Vec<Cause
         let (turn, sensor) = (turn(of).norm(), of.name());
         if half(of, 1.0).norm() >= ALIKE * turn {
             let words = format!(
-                "the {sensor} axes are not orthogonal (check the stated positions and labels; otherwise \
+                "the {sensor} axes are not orthogonal (check the stated positions and labels; if these are correct, \
                  installation_sigma_arcsec is too small)"
             );
             return (words, json!({ "cause": "skewed", "sensor": sensor }));
         }
         let angle_deg = turn / DEGREE;
         let words = format!(
-            "the {sensor} triad is rotated by {angle_deg:.3}° (check its mount in the instrument, or for gyros a \
-             time offset)"
+            "the {sensor} triad is rotated by {angle_deg:.3}° (check how it is mounted in the instrument or, for \
+             gyros, whether there is a time offset)"
         );
         let figures = json!({ "cause": "turned", "sensor": sensor, "angle_deg": angle_deg });
         (words, figures)

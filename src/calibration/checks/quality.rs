@@ -1,4 +1,4 @@
-//! Quality of a calibration by references that need no truth: gravity and turns.
+//! Quality of a calibration, judged by references that do not require the truth: gravity and turns.
 
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -25,8 +25,8 @@ use crate::units::MICRO_G;
 pub struct Quality {
     /// Residuals over the whole recording.
     pub all: Measures,
-    /// Cross-validation: residuals of a calibration without every other dwell, over these dwells and the turns that
-    /// end in them; `None` if the other dwells do not give a calibration.
+    /// Cross-validation: residuals of a calibration without every other dwell, evaluated in the omitted dwells and the
+    /// turns that end in them; `None` if the other dwells do not give a calibration.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub held_out: Option<Measures>,
     /// Residuals in each dwell.
@@ -35,7 +35,7 @@ pub struct Quality {
     /// Residuals in the excluded dwells, from the calibration without them.
     #[serde(skip)]
     pub held_out_dwells: Vec<DwellResidual>,
-    /// Residuals in each dwell before calibration: nominal scales, no misalignment, no bias.
+    /// Residuals in each dwell before calibration, that is, with nominal scales, no misalignments and no biases.
     #[serde(skip)]
     pub nominal_dwells: Vec<DwellResidual>,
 }
@@ -47,8 +47,8 @@ pub struct DwellResidual {
     pub number: usize,
     /// Magnitude of the mean specific force minus gravity, m/s².
     pub gravity: f64,
-    /// Angle between the gravity direction measured by the accelerometers and the one carried over from the previous
-    /// dwell by the gyros, rad; none in the first dwell of a stretch.
+    /// Angle between the gravity direction measured by the accelerometers and the direction that the gyros carried over
+    /// from the previous dwell, rad; `None` in the first dwell of a stretch.
     pub direction: Option<f64>,
 }
 
@@ -62,7 +62,7 @@ pub struct Residuals {
 
 impl Residuals {
     /// Medians of the magnitudes: gravity residuals as a fraction of gravity, and direction residuals as a fraction of
-    /// a turn; `None` without residuals.
+    /// a turn; `None` if there are no residuals.
     pub fn middle(&self) -> [Option<f64>; 2] {
         let gravity = self
             .dwells
@@ -143,7 +143,7 @@ impl Outcome {
     /// Residuals of gravity and turns over the whole recording.
     ///
     /// # Errors
-    /// [`CalibrationError`] if the problem is not the one of the outcome.
+    /// Returns [`CalibrationError`] if the outcome belongs to a different problem.
     pub(in crate::calibration) fn residuals(
         &self,
         problem: &Problem,
@@ -160,7 +160,7 @@ impl Outcome {
     /// Cross-validation solves the chain without the rows of every other dwell, at the linearisation point of the last pass.
     ///
     /// # Errors
-    /// [`CalibrationError`] if the problem is not the one of the outcome.
+    /// Returns [`CalibrationError`] if the outcome belongs to a different problem.
     pub fn quality(&self, problem: &Problem) -> Result<Quality, CalibrationError> {
         let Solved {
             script, effects, ..
@@ -190,7 +190,7 @@ impl ClosedForm {
     /// [`Outcome::quality`].
     ///
     /// # Errors
-    /// [`CalibrationError`] if the problem is not the one of the closed form.
+    /// Returns [`CalibrationError`] if the closed form belongs to a different problem.
     pub fn quality(&self, problem: &Problem) -> Result<Quality, CalibrationError> {
         let run = problem.run();
         let of = |triads: &PerSensor<Triad>, judged: &dyn Fn(usize) -> bool| {

@@ -1,4 +1,4 @@
-//! Test whether recordings differ by more than stated.
+//! Tests whether recordings differ by more than stated.
 
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -11,9 +11,9 @@ use crate::calibration::{DayToDay, Finding, FindingKind as Kind, Group, Model};
 pub struct RecordingDifference {
     /// The key of `[day_to_day]`.
     pub key: String,
-    /// The stated 1σ, in its unit.
+    /// The stated 1σ, in the unit of the key.
     pub stated: f64,
-    /// 1σ estimated from the recordings, in its unit.
+    /// 1σ estimated from the recordings, in the unit of the key.
     pub found: f64,
     /// −2 ln of the likelihood ratio of the stated to the estimated σ.
     pub ratio: f64,
@@ -45,15 +45,15 @@ impl RecordingDifference {
     }
 }
 
-/// The finding on estimated differences, if there are any.
+/// The finding on differences between recordings that were estimated, if there are any.
 pub fn recordings_differ(differences: &[RecordingDifference]) -> Option<Finding> {
     let one =
         |of: &RecordingDifference| format!("{} = {:.2e} (stated {})", of.key, of.found, of.stated);
     let each: Vec<String> = differences.iter().map(one).collect();
     let text = format!(
         "The recordings differ by more than their σ and [day_to_day] allow. turncal estimated the difference ({}) and \
-         included it in the σ. Usual causes: bias changes at switch-on, remounting (set mounting_arcsec), or a \
-         temperature sensor away from the inertial sensors.",
+         included it in the σ. The usual causes are bias changes at switch-on, remounting (set mounting_arcsec), and \
+         a temperature sensor that is not close to the inertial sensors.",
         each.join(", ")
     );
     let figures = json!({ "differences": differences });

@@ -9,7 +9,7 @@ use crate::statistics::{FALSE_ALARM, chi_square_limit};
 /// Number of triads with tested residuals.
 const TRIADS: f64 = 2.0;
 
-/// Residuals of least squares.
+/// Statistics of least-squares residuals.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Residuals {
     /// Sum of squared whitened residuals.
@@ -34,12 +34,12 @@ impl Residuals {
         chi_square_limit(self.degrees as f64, FALSE_ALARM / TRIADS)
     }
 
-    /// Whether the residuals are larger than chance explains.
+    /// Whether the residuals are larger than can be explained by chance.
     pub fn are_large(&self) -> bool {
         self.chi_square > self.limit()
     }
 
-    /// The finding on residuals of `gyro`, `accel` or `both triads` that are larger than chance explains.
+    /// The finding on residuals of `gyro`, `accel` or `both triads` that are larger than can be explained by chance.
     pub fn finding(&self, of: &str) -> Option<Finding> {
         let Self {
             chi_square,
@@ -50,8 +50,8 @@ impl Residuals {
         let text = format!(
             "The static fit of {of} is poor (χ² {chi_square:.0} with {degrees} degrees of freedom; limit {limit:.0}). \
              turncal widened the σ {}. The worst interval is {begin:.1}–{end:.1} s. Look there for a bump, a wrong \
-             label or a wrong attitude; otherwise check the noise figures in [imu.noise], the level and north of the \
-             table in [turntable], and whether the sensor was really still.",
+             label or a wrong attitude; if you find none, check the noise figures in [imu.noise], the level and north \
+             of the table in [turntable], and whether the sensor was really still.",
             widened_by(growth)
         );
         let figures = json!({

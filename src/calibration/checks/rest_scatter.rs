@@ -19,12 +19,12 @@ const PULSES: f64 = 2.0;
 /// A scatter smaller than this part of the stated noise is shown as zero.
 const NO_NOISE: f64 = 1e-3;
 
-/// Findings on triads with scatter at rest that disagrees with the noise imposed by the user (`NoisePolicy::Stated`).
+/// Findings on triads whose scatter at rest disagrees with the noise that the user requested (`NoisePolicy::Stated`).
 /// Calibrated inputs are used, because a wrong prior scale factor is not noise.
 ///
-/// A step lasts a tenth of a second, as in the filter: faster errors average out, and only random walk, bias and
-/// vibration of the mount remain. The result does not change the calibration, because it does not distinguish between
-/// these three causes.
+/// A step lasts a tenth of a second, as in the filter: errors that change faster average out, and only random walk,
+/// bias and vibration of the mount remain. The result does not change the calibration, because this test does not
+/// distinguish between these three causes.
 pub fn scatter_at_rest(problem: &Problem, calibrated: &PerSensor<Triad>) -> Vec<Finding> {
     let runs = problem.runs().enumerate();
     let each = runs.flat_map(|(recording, run)| Sensor::ALL.map(|sensor| (recording, run, sensor)));
@@ -83,8 +83,9 @@ fn of_triad<'a>(
         Sensor::Accel => "µg/√Hz",
     };
     let text = format!(
-        "{} noise at rest is {compared} the stated value: {} instead of {} {symbol} (tolerance −{:.1} % to +{:.1} %). \
-         The estimate uses 0.1 s averages, so vibration of the mount raises the result too. Run turncal allan on a \
+        "The {} noise at rest is {compared} the stated value: {} instead of {} {symbol} (tolerance −{:.1} % to +{:.1} \
+         %). \
+         The noise is estimated from 0.1 s averages, so vibration of the mount increases the result. Run turncal allan on a \
          long static recording to separate noise from vibration, and correct {figure}.",
         triad_name(sensor),
         shown,

@@ -1,12 +1,6 @@
-//! Uncertainty of rates that are rounded to steps wider than their noise.
-//!
-//! If nothing moves the value over the edge of a step, the rounding error is the same in every row, and averaging does
-//! not reduce it. With noise of σ, the remaining error is a sum of sine waves of the value, the k-th of amplitude
-//! step/πk · exp(−2π²k²σ²/step²) (Widrow and Kollár, *Quantization Noise*, 2008, on dither). The position of the value
-//! within a step is unknown, so half of their squares add up. With σ of half a step, the remaining error is negligible.
+//! Uncertainty due to the rounding of rates to steps larger than their noise.
 
 use std::collections::BTreeMap;
-use std::f64::consts::PI;
 
 use nalgebra::{Matrix3, Vector3};
 use serde_json::json;
@@ -15,27 +9,25 @@ use super::finding::{triad_name, widened_by};
 use crate::calibration::estimate::largest_growth;
 use crate::calibration::start::equations::{Common, Equations, Rows, of, of_parameters};
 use crate::calibration::{Finding, FindingKind as Kind, ParameterMatrix, Problem, parameter};
-use crate::imu::{Output, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
-use crate::recording::LogFacts;
+use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad, rounding_error};
+use crate::number::three_digits;
 use crate::run::{Aiding, Run};
 use crate::units::DEGREE;
 
-/// Number of summed waves; the others add a thousandth.
-const WAVES: u32 = 600;
 /// A variance of means, in (rad/s)² or (m/s²)², that no sensor shows: its square must not vanish in rounding.
 const NOTHING: f64 = f64::EPSILON * f64::EPSILON;
 /// Smallest growth of σ that is reported.
 const SAID: f64 = 1.05;
 
-/// Covariance due to rounding: the rounding errors in the means of dwells, propagated through least squares with the
-/// prior. Dwells with means within the same step have the same error. Without a table, accelerometers at rest observe
-/// only the magnitude of gravity.
+/// Covariance due to rounding: the rounding errors of the mean outputs in dwells, propagated through least squares with
+/// the prior. Dwells whose means are within the same step have the same rounding error. Without a table, accelerometers
+/// at rest observe only the magnitude of gravity.
 pub fn by_rounding(problem: &Problem, triads: &PerSensor<Triad>) -> ParameterMatrix {
     let of = |&sensor: &Sensor| of_triad(problem, sensor, triads);
     Sensor::ALL.iter().filter_map(of).sum()
 }
 
-/// Findings on triads for which rounding matters; `covariance` is that of the estimate, rounding included.
+/// Findings on triads for which rounding matters; `covariance` is the covariance of the estimate, including rounding.
 pub fn rounded(
     problem: &Problem,
     by_rounding: &ParameterMatrix,
@@ -48,16 +40,19 @@ pub fn rounded(
         let without = with - part;
         let [without, with] = [&without, &with].map(|m| &m.as_slice()[of_triad.clone()]);
         let growth = largest_growth(without, with);
-        let steps = problem.runs().map(|run| steps(run, sensor).max());
+        let steps = problem
+            .runs()
+            .map(|run| run.recording.imu.resolution(sensor).max());
         let (value, unit) = match sensor {
             Sensor::Gyro => (DEGREE, "°/s"),
             Sensor::Accel => (1.0, "m/s²"),
         };
         let step = steps.fold(0.0, f64::max) / value;
         let text = format!(
-            "{} values are rounded to {step:.2e} {unit}, coarser than their noise, so averaging cannot recover their \
-             position within a step. turncal widened the σ {}. Log more digits.",
+            "{} values are rounded to {} {unit}, which is coarser than their noise, so averaging cannot recover the \
+             mean within a step. turncal widened the σ {}. Log more digits.",
             triad_name(sensor),
+            three_digits(step),
             widened_by(growth)
         );
         let of = sensor.name();
@@ -113,22 +108,6 @@ fn of_triad(
     equations.by_errors()
 }
 
-/// Resolution of rates along body axes, rad/s or m/s²; zero if not rounded, or if rows are integrals, which may carry
-/// the remainder.
-fn steps(run: &Run, sensor: Sensor) -> Vector3<f64> {
-    let imu = &run.recording.imu;
-    // Means of positions are few, so their steps are not those of rounding.
-    let is_rounded = imu.has(sensor) && !imu.is_of_means();
-    let of_rates = |log: &&LogFacts| is_rounded && log.output == Output::Rate;
-    let Some(log) = imu.log.as_ref().filter(of_rates) else {
-        return Vector3::zeros();
-    };
-    Vector3::from_fn(|axis, _| {
-        let facts = &log.columns.get(sensor)[axis];
-        facts.step.unwrap_or(0.0) * facts.unit.abs() / imu.period
-    })
-}
-
 /// The mean of a triad's rows over a dwell.
 struct Mean {
     /// Mean along body axes, rad/s or m/s².
@@ -141,7 +120,7 @@ struct Mean {
 
 /// Means of a recording's dwells; empty if rows are not rounded.
 fn of_recording(problem: &Problem, recording: usize, run: &Run, sensor: Sensor) -> Vec<Mean> {
-    let steps = steps(run, sensor);
+    let steps = run.recording.imu.resolution(sensor);
     if steps == Vector3::zeros() {
         return Vec::new();
     }
@@ -196,11 +175,7 @@ fn left(step: f64, scatter: f64, stated: f64) -> f64 {
     } else {
         seen.min(stated / square)
     };
-    let wave = |k: u32| {
-        let k = f64::from(k);
-        (-4.0 * PI * PI * k * k * noise).exp() / (2.0 * PI * PI * k * k)
-    };
-    square * (1..=WAVES).map(wave).sum::<f64>()
+    rounding_error(step, noise * square)
 }
 
 #[cfg(test)]

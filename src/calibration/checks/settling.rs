@@ -1,4 +1,4 @@
-//! Test whether the table settles after its stops.
+//! Tests whether the table settles after its stops.
 
 use serde_json::json;
 
@@ -7,7 +7,7 @@ use crate::calibration::{Finding, FindingKind as Kind, Outcome, Problem, Source}
 use crate::number::three_digits;
 use crate::statistics::{FALSE_ALARM, chi_square_limit};
 
-/// The finding, if an unstated settling is larger than the error of a reading.
+/// The finding, if a settling error that is not stated is larger than the error of a reading.
 pub fn settles(problem: &Problem, outcome: &Outcome) -> Option<Finding> {
     let mut sources = outcome.noise.sources.iter();
     let found = sources.find(|of| of.source == Source::Settling && of.stated.is_none())?;

@@ -14,7 +14,7 @@ use crate::statistics::FALSE_ALARM;
 /// A term that a path does not show is reported if it increases the σ of a group by more than this factor.
 const NAMED: f64 = 1.25;
 
-/// Whether a candidate, absent with this probability, counts as present among this many candidates.
+/// Whether a candidate with this probability of absence counts as present, given the number of candidates.
 pub fn is_shown(absent: f64, candidates: usize) -> bool {
     absent < FALSE_ALARM / candidates.max(1) as f64
 }
@@ -28,7 +28,7 @@ pub struct TermEvidence {
     pub present: f64,
     /// Whether the data show the term although it was not requested (false-alarm rate 1 in 1000 recordings).
     pub shown: bool,
-    /// Largest remaining part of its usual size: from 0 (known) to 1 (not shown by the recording).
+    /// Largest remaining part of the usual size of the term, from 0 (known) to 1 (not shown by the recording).
     pub remaining: f64,
     /// RMS σ of each of [`Group::all`] with the term, divided by RMS σ if the term were known to be absent; `None` if
     /// the group has no σ.
@@ -113,9 +113,9 @@ fn estimated(shown: &[&TermEvidence]) -> Option<Finding> {
     });
     let names: Vec<String> = names.collect();
     let text = format!(
-        "The data show errors that scale factors, misalignments and biases cannot explain: {} (probability above \
-         99.9 %). turncal estimated these too, as with --with. Apply the calibration with `turncal apply`; exports \
-         without these terms leave their errors in.",
+        "The data show errors that scale factors, misalignments and biases cannot explain: {} (probability above 99.9 \
+         %). turncal estimated these error terms too, as if they had been given with --with. Apply the calibration \
+         with `turncal apply`; exports without these terms leave the errors in the data.",
         names.join(", ")
     );
     let finding = || Finding::new(Kind::ErrorTermEstimated, text, figures(shown));
@@ -134,8 +134,8 @@ fn not_shown(terms: &[&TermEvidence]) -> Option<Finding> {
     shown_by.sort_unstable();
     shown_by.dedup();
     let text = format!(
-        "This recording does not show these possible errors, which make σ larger: {}. Add {}, or use --with none \
-         if the sensor is known to have none of them.",
+        "This recording cannot show these possible errors, so they increase the σ: {}. Add {}, or use --with none if \
+         you know that the sensor has none of these errors.",
         each.join(", "),
         shown_by.join(", ")
     );

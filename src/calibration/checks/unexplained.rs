@@ -1,4 +1,5 @@
-//! Tests for results that must not be used: without convergence, or with residuals that no noise figure explains.
+//! Tests for results that must not be used, because the iterations did not converge or no noise figure explains the
+//! residuals.
 
 use serde_json::json;
 
@@ -30,7 +31,7 @@ pub fn not_converged(outcome: &Outcome) -> Option<Finding> {
         .last()
         .map_or(f64::NAN, |pass| pass.largest_step);
     let text = format!(
-        "Not converged: the last of {passes} passes still moved a parameter by {step:.2} σ. Do not use the values or \
+        "Not converged: in the last of {passes} passes, a parameter still changed by {step:.2} σ. Do not use the values or \
          σ. Check scale, units and axes in run.toml with turncal check."
     );
     let figures = json!({ "passes": passes, "largest_step_sigma": step });
@@ -51,7 +52,8 @@ pub fn absurd(problem: &Problem, outcome: &Outcome) -> Option<Finding> {
     let (name, middle) = worst.max_by(|one, other| one.1.total_cmp(&other.1))?;
     let percent = format!("{} %", three_digits(100.0 * middle));
     let text = format!(
-        "Calibration rejected: in the median dwell {}, more than the error of any sensor after calibration. Do not use \
+        "Calibration rejected: in the median dwell, {}, which is more than the error of any calibrated \
+         sensor. Do not use \
          the values or σ. Check units, axes and rate in run.toml with turncal check.",
         name.replace("{}", &percent)
     );
@@ -59,14 +61,14 @@ pub fn absurd(problem: &Problem, outcome: &Outcome) -> Option<Finding> {
     (middle > ABSURD).then(|| Finding::new(Kind::Unexplained, text, figures))
 }
 
-/// The finding, if innovations are larger than wrong figures of a data sheet can explain.
+/// The finding, if the innovations are larger than wrong data-sheet values can explain.
 pub fn unexplained(all: &Nis, innovations: &[Innovation]) -> Option<Finding> {
     let distances = innovations.iter().map(|i| (i.time, i.distance()));
     let worst = distances.max_by(|one, other| one.1.total_cmp(&other.1))?;
     rejected("NIS", all.mean, worst.0)
 }
 
-/// The finding for a closed form, from the findings on its residuals.
+/// The finding for a closed form, derived from the findings on its residuals.
 pub fn unexplained_residuals(findings: &[Finding]) -> Option<Finding> {
     let large = |finding: &&Finding| finding.is(Kind::ResidualsLarge);
     findings.iter().filter(large).find_map(|finding| {
@@ -81,7 +83,7 @@ pub fn unexplained_residuals(findings: &[Finding]) -> Option<Finding> {
 fn rejected(name: &str, nis: f64, worst: f64) -> Option<Finding> {
     let limit = limit();
     let text = format!(
-        "Calibration rejected: {name} is {nis:.0}, far above anything a wrong noise figure could cause (limit \
+        "Calibration rejected: {name} is {nis:.0}, far larger than any wrong noise figure could cause (limit \
          {limit:.0}). The largest residual is at {worst:.1} s: look there for lost, repeated or wrapped rows, a bump \
          or a wrong table position."
     );

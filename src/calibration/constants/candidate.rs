@@ -13,7 +13,7 @@ pub enum Candidate {
     Term(ErrorTerm),
     /// A latitude that differs from the stated one.
     EarthRate,
-    /// A function of temperature in all parameters of a kind.
+    /// A function of temperature for all parameters of one kind.
     Order(Sensor, ParameterKind, usize),
 }
 
@@ -37,7 +37,8 @@ impl Candidate {
 }
 
 impl Constant {
-    /// The constants of a model; those that may be absent are last. `gravity` states whether gravity is a constant.
+    /// The constants of a model; those that may be absent are last. `gravity` states whether gravity is one of the
+    /// constants.
     pub fn all(model: &Model, gravity: bool) -> Vec<Self> {
         let parameters = (0..PARAMETERS).filter(|&i| model.prior_sigma[i] > 0.0);
         let parameters = parameters.map(Self::Parameter);

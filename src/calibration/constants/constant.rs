@@ -22,14 +22,14 @@ pub enum Constant {
     Base(usize),
     /// An error of the table's axes, by its index.
     Axis(usize),
-    /// Deviation of Earth rate from that at the stated latitude, by its axis: East, North, Up.
+    /// Deviation of Earth rate from its value at the stated latitude, by axis: East, North, Up.
     EarthRate(usize),
     /// A constant of the magnetometer or its field, by its index.
     Magnetic(usize),
 }
 
 impl Constant {
-    /// The budget source of its prior.
+    /// The source of its prior in the uncertainty budget.
     pub fn source(self) -> BudgetSource {
         match self {
             Self::Parameter(_) => BudgetSource::Prior,
@@ -48,7 +48,7 @@ impl Constant {
         }
     }
 
-    /// Index among the auxiliary parameters, if it is one.
+    /// Index among the auxiliary parameters, if the constant is one of them.
     pub fn auxiliary(self) -> Option<usize> {
         match self {
             Self::Base(axis) => Some(axis),
@@ -58,7 +58,7 @@ impl Constant {
         }
     }
 
-    /// The error term to which it belongs, if any.
+    /// The error term to which the constant belongs, if any.
     pub fn error_term(self) -> Option<ErrorTerm> {
         match self {
             Self::Term(index) => Term::of(index).map(ErrorTerm::Instrument),
@@ -68,7 +68,7 @@ impl Constant {
         }
     }
 
-    /// Prior 1σ of a constant or, if it may be absent, its usual size; zero if it is off.
+    /// Prior 1σ of a constant or, if the constant may be absent, its usual size; zero if the constant is off.
     pub fn sigma(self, model: &Model) -> f64 {
         let stated = match self {
             Self::Parameter(index) => model.prior_sigma[index],

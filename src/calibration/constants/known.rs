@@ -23,11 +23,11 @@ pub struct Information {
     pub vector: DVector<f64>,
 }
 
-/// Normal priors of the constants that may be absent, and the covariance that averaging over several cases adds.
+/// Normal priors of the constants that may be absent, and the additional covariance from averaging over several cases.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sites {
     pub information: Information,
-    /// Covariance between the cases, from both sides multiplied by the inverse of the covariance.
+    /// Covariance between the cases, multiplied from both sides by the inverse of the covariance.
     pub between: DMatrix<f64>,
 }
 
@@ -67,7 +67,7 @@ impl Known {
         self.root = triangle(&with);
     }
 
-    /// Information of the rows on the constants that may be absent, with all others marginalised.
+    /// Information from the rows on the constants that may be absent, with all other constants marginalised.
     pub fn of_candidates(&self) -> Information {
         let (n, m) = (self.open.len(), self.prior.candidates);
         let root = self.root.view((n - m, n - m), (m, m));
@@ -85,7 +85,7 @@ impl Known {
         root.solve_upper_triangular_mut(&mut by).then_some(by)
     }
 
-    /// Root mean square change of the parameters of both triads due to the candidates at these positions, each of its
+    /// Returns the RMS change of the parameters of both triads due to the candidates at these positions, each with its
     /// usual size; and the largest remaining fraction of this size if all other candidates are absent.
     pub fn effect_of(&self, places: &[usize]) -> Option<(ParameterVector, f64)> {
         let (n, m) = (self.open.len(), self.prior.candidates);
@@ -109,7 +109,7 @@ impl Known {
         Some((squares.map(f64::sqrt), least.sqrt().recip()))
     }
 
-    /// Estimate and covariance with these factors for the constants that may be absent; `None` if something is still
+    /// Estimate and covariance with these factors for the constants that may be absent; `None` if a constant is still
     /// undetermined.
     pub fn with(&self, sites: &Sites) -> Option<Posterior> {
         let (n, m) = (self.open.len(), self.prior.candidates);
@@ -185,7 +185,7 @@ impl Known {
 }
 
 impl Sites {
-    /// Makes all constants known at their prior mean, to a millionth of their usual size.
+    /// Fixes all constants at their prior mean, to a millionth of their usual size.
     pub fn certain(prior: &Prior) -> Self {
         let (n, m) = (prior.sigma.len(), prior.candidates);
         let information = prior
@@ -198,7 +198,7 @@ impl Sites {
         })
     }
 
-    /// Priors that add nothing to the rows.
+    /// Priors that add no information to the rows.
     pub fn none(prior: &Prior) -> Self {
         let m = prior.candidates;
         Self::of(Information {

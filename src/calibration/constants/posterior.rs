@@ -16,7 +16,7 @@ pub struct Posterior {
     pub mean: DVector<f64>,
     /// Estimated errors of the parameters of both triads.
     pub parameters: ParameterVector,
-    /// Covariance of all constants; zero for fixed ones.
+    /// Covariance of all constants; zero for fixed constants.
     pub covariance: DMatrix<f64>,
     /// Covariance of the parameters of both triads.
     pub parameter_covariance: ParameterMatrix,
@@ -50,7 +50,8 @@ impl Posterior {
         }
     }
 
-    /// Estimates of the temperature coefficients, linearised `at` a point; `None` if nothing depends on temperature.
+    /// Estimates of the temperature coefficients, linearised at the point `at`; `None` if no parameter depends on
+    /// temperature.
     pub fn thermal(&self, at: &Linearisation, model: &Model) -> Option<Thermal> {
         let of_model = model.thermal.as_deref()?;
         let (places, coefficients): (Vec<usize>, Vec<_>) = coefficients(&self.constants).unzip();

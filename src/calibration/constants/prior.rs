@@ -44,7 +44,8 @@ impl Prior {
         }
     }
 
-    /// Exact contribution to a covariance, by source: `P P₀⁻¹ P`; without the constants that may be absent.
+    /// Exact contribution of the prior to a covariance, by source: `P P₀⁻¹ P`, without the constants that may be
+    /// absent.
     pub fn parts(&self, of: &Posterior) -> BTreeMap<BudgetSource, DMatrix<f64>> {
         let n = self.constants.len();
         let mut parts = BTreeMap::new();

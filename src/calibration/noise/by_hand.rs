@@ -1,4 +1,5 @@
-//! Additional noise of turning and holding by hand, from the equations of a calibration with gravity alone.
+//! Additional noise caused by turning and holding the sensor by hand, estimated from the equations of a calibration
+//! with gravity alone.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -8,7 +9,7 @@ use super::variances::{Component, Slope, likeliest};
 use crate::calibration::{Model, Problem};
 use crate::statistics::FALSE_ALARM;
 
-/// Sources of noise by hand: attitude noise in moves, of both kinds, and in dwells.
+/// Sources of hand noise: both kinds of attitude noise in moves, and rotation in dwells.
 pub const BY_HAND: [Source; 3] = [
     Source::GyroMotion,
     Source::GyroMoving,
@@ -20,17 +21,17 @@ pub type Parts = [DVector<f64>; BY_HAND.len()];
 
 /// Additional noise that makes the errors more likely than the stated noise.
 ///
-/// The noise is found by maximum likelihood, with the parameters integrated out with their prior. With few more
-/// equations than parameters, residuals would not show the noise, because parameter values that are unlikely under the
-/// prior can explain any noise.
+/// The noise is estimated by maximum likelihood, with the parameters integrated out under their prior. If there are
+/// only a few more equations than parameters, the residuals do not show the noise, because unlikely parameter values
+/// can explain any noise.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ByHand {
     found: Vec<Component>,
 }
 
 impl ByHand {
-    /// Adds sources one by one while the improvement is significant, from the prior errors of the equations and their
-    /// covariance due to prior and stated noise.
+    /// Adds sources one by one while the improvement is significant, given the errors of the equations at the prior and
+    /// the covariance of these errors due to prior and stated noise.
     pub fn likeliest(
         errors: &DVector<f64>,
         covariance: &DMatrix<f64>,

@@ -5,10 +5,10 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 /// Half of a 95 % interval, in σ.
 pub const INTERVAL: f64 = 1.96;
 
-/// The limit that −2 ln of a likelihood ratio exceeds with probability `false_alarm`. `two_sided` factors may
-/// change either way; `one_sided` ones are at their lower bound of zero. The distribution is a mixture of χ²:
-/// each one-sided factor counts with probability one half (Self and Liang 1987, J. Am. Stat. Assoc. 82(398),
-/// case 9, with uncorrelated factors).
+/// The limit that −2 ln of a likelihood ratio exceeds with the probability `false_alarm`. `two_sided` factors may
+/// increase or decrease; `one_sided` factors are at their lower bound of zero. The distribution is a mixture of χ²:
+/// each one-sided factor counts with probability one half (Self and Liang 1987, J. Am. Stat. Assoc. 82(398), case 9,
+/// with uncorrelated factors).
 pub fn limit(two_sided: usize, one_sided: usize, false_alarm: f64) -> f64 {
     let beyond = |limit: f64| -> f64 {
         let mut weight = 0.5f64.powi(one_sided as i32);

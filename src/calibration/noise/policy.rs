@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 pub enum NoisePolicy {
     /// Use the noise stated in run.toml and models
     Stated,
-    /// Estimate the noise from the recording, with the stated noise as prior
+    /// Estimate the noise from the recording, and use the stated noise as the prior
     #[default]
     Auto,
     /// The same as auto

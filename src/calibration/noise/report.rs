@@ -16,9 +16,9 @@ use crate::number::three_digits;
 pub struct NoiseReport {
     /// The requested policy.
     pub policy: NoisePolicy,
-    /// Whether the noise was estimated; otherwise it is as stated.
+    /// Whether the noise was estimated; if it was not, the stated noise was used.
     pub learnt: bool,
-    /// The test of the stated noise; `None` if nothing was tested.
+    /// The test of the stated noise; `None` if no figure was tested.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub test: Option<NoiseTest>,
     /// Every possible source of the recording.
@@ -26,10 +26,10 @@ pub struct NoiseReport {
     pub sources: Vec<SourceFigures>,
 }
 
-/// The test of the stated noise against the estimated noise.
+/// Test whether the stated noise agrees with the estimated noise.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct NoiseTest {
-    /// The largest squared distance of a stated figure from the estimate, in logarithms and their σ.
+    /// The largest squared distance of a stated figure from the estimate: logarithm of the ratio, in units of its σ.
     #[serde(default)]
     pub ratio: f64,
     /// Limit of the squared distance for correct stated noise (χ², p < 0.001 over all figures).
@@ -48,12 +48,12 @@ pub struct SourceFigures {
     pub name: String,
     /// Unit of the figures.
     pub unit: String,
-    /// The stated value, or the one measured in dwells before the filter; `None` if neither exists.
+    /// The stated value, or the value measured in dwells before the filter; `None` if neither exists.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stated: Option<f64>,
     /// The value used.
     pub used: f64,
-    /// 95 % interval; `None` if it was not estimated.
+    /// 95 % interval of the estimate; `None` if the source was not estimated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub interval: Option<[f64; 2]>,
 }
@@ -109,7 +109,7 @@ impl SourceFigures {
         }
     }
 
-    /// Whether the source is present, stated or estimated.
+    /// Whether the source is present, because it was stated or estimated.
     pub fn counts(&self) -> bool {
         self.used > 0.0 || self.stated.is_some()
     }
@@ -147,7 +147,7 @@ fn symbol(unit: &str) -> String {
     })
 }
 
-/// A finding lists a stated figure if the estimate is more than this many times as large.
+/// A finding lists a stated figure if the estimate is more than this many times as large as the figure.
 pub const NAMED: f64 = 1.5;
 
 /// The finding on estimated noise, with the squared distance of the worst stated figure and its limit. `None` if no
@@ -179,8 +179,8 @@ fn noise_learnt(
     let tables: Vec<String> = tables.collect();
     let lines: Vec<&String> = lines.iter().map(|(_, line)| line).collect();
     let text = format!(
-        "Noise is larger than stated: {} (squared distance {ratio:.0}; limit {limit:.0}). turncal used its own \
-         estimate, and each σ includes it. To use this estimate for the next recording, state {}.",
+        "The noise is larger than stated: {} (squared distance {ratio:.0}; limit {limit:.0}). turncal used its own \
+         estimate, which every σ includes. To use this estimate for the next recording, state {}.",
         words.join("; "),
         tables.join("; ")
     );

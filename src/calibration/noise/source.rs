@@ -1,4 +1,4 @@
-//! The sources of noise, one row each, and the position of its σ in the model.
+//! The sources of noise, one row per source, with the position of its σ in the model.
 
 use serde::{Deserialize, Serialize};
 
@@ -30,17 +30,18 @@ macro_rules! sources {
                 match self { $(Self::$variant => $name,)* }
             }
 
-            /// The unit in which its σ is shown, and that unit in SI and radians.
+            /// The unit in which σ is shown, and the size of this unit in SI units and radians.
             pub fn unit(self) -> (&'static str, f64) {
                 match self { $(Self::$variant => ($unit, $value),)* }
             }
 
-            /// Triad, or the triad whose random walk is its reference.
+            /// The triad of the source, or the triad whose random walk is its reference.
             pub fn triad(self) -> Sensor {
                 match self { $(Self::$variant => Sensor::$triad,)* }
             }
 
-            /// The table of `run.toml` that states it, the key there, and its unit in SI and radians.
+            /// The table of `run.toml` that states the source, the key in this table, and the unit in SI units and
+            /// radians.
             pub fn stated_in(self) -> (&'static str, (&'static str, f64)) {
                 match self { $(Self::$variant => ($table, $line),)* }
             }
@@ -59,7 +60,7 @@ sources! {
         "imu.noise" GYRO.random_walk, part of White(Gyro);
     VelocityRandomWalk, Accel, "velocity random walk" in "ug/sqrt(Hz)" = MICRO_G_PER_SQRT_HZ,
         "imu.noise" ACCEL.random_walk, part of White(Accel);
-    GyroMotion, Gyro, "attitude noise in moves, by rate" in "sqrt(s)" = 1.0,
+    GyroMotion, Gyro, "attitude noise of moves, proportional to rate" in "sqrt(s)" = 1.0,
         "imu.noise" (GYRO.by_motion, 1.0), part of Moves(Gyro);
     AccelMotion, Accel, "velocity noise in moves, by acceleration" in "sqrt(s)" = 1.0,
         "imu.noise" (ACCEL.by_motion, 1.0), part of Moves(Accel);

@@ -10,7 +10,7 @@ const STEPS: usize = 40;
 /// One component.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Component {
-    /// Number among all candidates.
+    /// Number of the component among all candidates.
     pub place: usize,
     pub variance: f64,
     /// 1σ of the logarithm of the variance.
@@ -22,14 +22,15 @@ pub struct Component {
 pub struct Slope {
     /// −2 ln of the likelihood, up to a constant.
     pub deviance: f64,
-    /// Gradient of the log-likelihood with respect to that variance.
+    /// Gradient of the log-likelihood with respect to the variance of the component.
     pub score: f64,
     /// Expected information.
     pub information: f64,
 }
 
 /// Adds components (out of this number) one by one while −2 ln of the likelihood decreases by more than a limit; also
-/// returns the total decrease. `slope` evaluates the likelihood of some components, with its slope with respect to one.
+/// returns the total decrease. `slope` evaluates the likelihood for some components, and its slope with respect to one
+/// of them.
 pub fn likeliest(
     count: usize,
     limit: f64,

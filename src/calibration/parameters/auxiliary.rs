@@ -26,7 +26,7 @@ pub enum AuxiliaryKind {
 }
 
 impl AuxiliaryKind {
-    /// The parameter at an index; `None` beyond the last.
+    /// The auxiliary parameter at an index; `None` if the index is beyond the last parameter.
     pub fn of(index: usize) -> Option<Self> {
         match index.checked_sub(TABLE_GEOMETRY) {
             None => Some(Self::Table(index)),
@@ -70,16 +70,16 @@ pub fn auxiliary_vector(
 /// Correlation beyond which two terms cannot be distinguished.
 const INSEPARABLE: f64 = 0.99;
 
-/// Estimates of the auxiliary parameters; all figures of a disabled one are zero.
+/// Estimates of the auxiliary parameters; all figures of a disabled parameter are zero.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Auxiliary {
-    /// The estimates, rad for the table, SI for terms.
+    /// The estimates, in rad for the table and in SI units for the terms.
     pub values: AuxiliaryVector,
     /// Covariance of the estimates, [`AUXILIARY`] square.
     pub covariance: DMatrix<f64>,
     /// Covariance of the parameters of both triads (rows) with the estimates.
     pub cross: DMatrix<f64>,
-    /// Prior 1σ of each, with mean zero.
+    /// Prior 1σ of each parameter, with mean zero.
     pub prior_sigma: AuxiliaryVector,
 }
 
@@ -115,8 +115,8 @@ impl Auxiliary {
             .into()
     }
 
-    /// Whether second order and asymmetry of an accelerometer are both estimated, although little more than their sum
-    /// is observed.
+    /// Whether the second-order term and the asymmetry term of an accelerometer are both estimated, although the data
+    /// determine hardly more than their sum.
     pub fn even_terms_inseparable(&self) -> bool {
         let first = |term: Term| TABLE_GEOMETRY + term.parameters().start;
         let (second, asymmetry) = (first(Term::AccelSecondOrder), first(Term::AccelAsymmetry));

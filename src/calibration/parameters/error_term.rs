@@ -19,7 +19,8 @@ pub enum ErrorTerm {
 }
 
 impl ErrorTerm {
-    /// Every error term. If two terms explain a recording equally well, the first in this order is more common.
+    /// Every error term. If two terms explain a recording equally well, the one that comes first in this order is more
+    /// common.
     pub const ALL: [Self; 5 + Term::ALL.len()] = {
         let mut all = [Self::GaussMarkovBias; 5 + Term::ALL.len()];
         (all[1], all[2]) = (Self::TableBase, Self::TableAxes(AxisError::Tilt));

@@ -15,13 +15,13 @@ pub struct Group {
 /// Notation for the figures of a group.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GroupEntry {
-    /// Kind with the letter of the model.
+    /// Kind of parameter, with its letter in the model.
     pub title: &'static str,
     /// Key in files, with the unit.
     pub key: &'static str,
     /// Symbol of the unit.
     pub unit: &'static str,
-    /// The unit in the model's normalised SI values.
+    /// Size of the unit in the normalised SI values of the model.
     pub value: f64,
 }
 
@@ -52,7 +52,7 @@ impl Group {
         self.kind
     }
 
-    /// Notation for its figures.
+    /// Notation for the figures of the group.
     pub fn entry(self) -> GroupEntry {
         let (title, key, unit, value) = match (self.kind, self.sensor) {
             (ParameterKind::Scale, _) => ("scale factor K", "scale_ppm", "ppm", PPM),
@@ -96,12 +96,12 @@ impl Group {
         self.entry().unit
     }
 
-    /// The unit in normalised SI values of the model.
+    /// Size of the unit in the normalised SI values of the model.
     pub fn unit_value(self) -> f64 {
         self.entry().value
     }
 
-    /// The displayed value of a parameter: scale factors as deviation from nominal.
+    /// The displayed value of a parameter; a scale factor is displayed as its deviation from nominal.
     pub fn shown(self, value: f64) -> f64 {
         match self.kind() {
             ParameterKind::Scale => (value - 1.0) / self.unit_value(),
@@ -124,7 +124,7 @@ impl Group {
             .map(|largest| (largest, mean_square.sqrt()))
     }
 
-    /// Indices of its parameters in this form.
+    /// Indices of the parameters of the group in this misalignment form.
     pub fn parameters(self, form: InstallationForm) -> Vec<usize> {
         (0..PARAMETERS)
             .filter(|&index| Self::of(index) == self && parameter_name(form, index).is_some())

@@ -1,4 +1,4 @@
-//! The parameters of both triads as one vector: gyros, then accelerometers, each in the order of
+//! The parameters of both triads as one vector: first the gyros, then the accelerometers, each in the order of
 //! [`crate::imu::TriadVector`]. Parameter errors δθ are true − estimated.
 
 pub mod auxiliary;
@@ -19,7 +19,7 @@ pub type ParameterVector = SVector<f64, PARAMETERS>;
 /// A matrix of the parameters of both triads.
 pub type ParameterMatrix = SMatrix<f64, PARAMETERS, PARAMETERS>;
 
-/// Index among the parameters of both triads of a parameter of one triad.
+/// Converts the index of a parameter of one triad to its index among the parameters of both triads.
 pub fn parameter(sensor: Sensor, of_triad: usize) -> usize {
     match sensor {
         Sensor::Gyro => of_triad,
@@ -27,7 +27,7 @@ pub fn parameter(sensor: Sensor, of_triad: usize) -> usize {
     }
 }
 
-/// The triad and its parameter at an index among the parameters of both.
+/// The triad, and the index within the triad, of a parameter of both triads.
 pub fn sensor_and_parameter(index: usize) -> (Sensor, usize) {
     if index < PER_TRIAD {
         (Sensor::Gyro, index)
@@ -67,7 +67,7 @@ pub fn parameter_index(form: InstallationForm, name: &str) -> Option<usize> {
     (0..PARAMETERS).find(|&index| parameter_name(form, index).as_deref() == Some(name))
 }
 
-/// The factor from a normalised parameter to the file's quantity, by nominal scales.
+/// The factor that converts a normalised parameter to the file's quantity, from the nominal scales.
 pub fn factor(nominal: &PerSensor<Nominal>, index: usize) -> f64 {
     let (sensor, of_triad) = sensor_and_parameter(index);
     nominal.get(sensor).factor(of_triad)

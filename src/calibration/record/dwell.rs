@@ -27,9 +27,9 @@ pub struct Rest {
     pub from: State,
     /// Linearisation state at the start of the part.
     pub begin: State,
-    /// Rotation of the table attitude per axis error, if the angles are known.
+    /// Rotation of the table attitude for a unit error of each axis, if the angles are known.
     pub axes: Option<Arc<AxisResponse>>,
-    /// Error models of its steps; equal steps share one.
+    /// Error models of the steps in the part; equal steps share one model.
     pub models: Vec<Block>,
     pub steps: Vec<Standing>,
     /// Observations, step by step.
@@ -41,12 +41,12 @@ pub struct Rest {
 /// A step of a dwell.
 #[derive(Debug, Clone)]
 pub struct Standing {
-    /// End of the step, s.
+    /// Time at the end of the step, s.
     pub time: f64,
-    /// Index of its model in the part.
+    /// Index of the error model of the step in the part.
     pub model: usize,
-    /// Change of the errors of attitude, velocity and position before the step, because they refer to another computed
-    /// state.
+    /// Change in the errors of attitude, velocity and position before the step; it occurs because the errors then refer
+    /// to a different computed state.
     pub referred: [Vector3<f64>; 3],
     /// Indices of the observations at the end of the step.
     pub seen: Range<usize>,
@@ -62,7 +62,7 @@ pub struct Seen {
     pub readings: usize,
 }
 
-/// Number of these steps that form a part of at most this many samples; the first step is in a dwell.
+/// Number of these steps that together form a part of at most this many samples; the first step is in a dwell.
 pub fn part_of(steps: &[Step], longest: usize) -> usize {
     let end = steps.first().map_or(0, |step| step.samples.start + longest);
     let belongs = |step: &&Step| {
@@ -80,7 +80,7 @@ pub fn longest(first: &Step) -> usize {
 
 impl Rest {
     /// Navigates through these steps from the current state. Each step starts from the same state at rest, to which the
-    /// result of the previous step is referred; `held` is the attitude computed when the body came to rest.
+    /// result of the previous step is referred; `held` is the attitude that was computed when the body came to rest.
     pub fn navigate(
         navigator: &mut Navigator,
         (problem, stretch): (&Problem, &Stretch),
@@ -142,7 +142,7 @@ impl Rest {
         }
     }
 
-    /// End of the step, s.
+    /// Time at the end of the step, s.
     pub fn end(&self) -> f64 {
         self.steps.last().map_or(0.0, |step| step.time)
     }
@@ -195,8 +195,8 @@ pub fn samples_of(steps: &[Step]) -> Range<usize> {
 }
 
 /// Change of the errors of attitude, velocity and position if they are referred to another computed state at the same
-/// time. It is of first order, like everything in a pass, so the filter stays linear and its result does not depend on
-/// the order of observations.
+/// time. This change is of first order, like all terms in a pass, so the filter stays linear and its result does not
+/// depend on the order of the observations.
 pub fn between(from: &State, to: &State) -> [Vector3<f64>; 3] {
     [
         to_tilt_and_heading(&(from.attitude * to.attitude.transpose())),

@@ -1,4 +1,4 @@
-//! Events of a recording, from navigation; they do not depend on the noise.
+//! Events of a recording, found by navigation; they do not depend on the noise.
 
 pub mod dwell;
 pub mod schedule;
@@ -21,8 +21,8 @@ pub enum Event {
     Rest(Box<Rest>),
 }
 
-/// Events in a stretch of a problem, linearised at this point; with the attitude at the first sample, and the number of the
-/// stretch's first dwell.
+/// Events in a stretch of a problem, linearised at this point. The arguments include the attitude at the first sample
+/// and the number of the first dwell of the stretch.
 pub fn events(
     of: (&Problem, &Stretch),
     (at, initial, first_dwell): (&Linearisation, &Matrix3<f64>, usize),

@@ -25,7 +25,7 @@ pub struct Step {
 pub struct AtRest {
     /// Whether this is the first step of the dwell.
     pub first: bool,
-    /// Sums of its samples.
+    /// Sums of the samples in the step.
     pub sums: Sums,
     /// Mean of the table's readings during the step, and their number.
     pub reading: Option<(Matrix3<f64>, usize)>,
@@ -38,7 +38,7 @@ pub struct AtRest {
 pub struct WholeDwell {
     /// Mean of the table's readings, `C_b_n`; `None` without a table.
     pub attitude: Option<Matrix3<f64>>,
-    /// Rotation of the table attitude per error of its axes, if their angles are known.
+    /// Rotation of the table attitude for a unit error of each axis, if the angles are known.
     pub axes: Option<Arc<AxisResponse>>,
     /// Mean output of the accelerometers.
     pub accel: Vector3<f64>,
@@ -112,11 +112,11 @@ pub fn steps(run: &Run, table: Option<&TableLog>, dwells: &[Dwell]) -> Vec<Step>
 }
 
 impl AtRest {
-    /// Linearisation point while the table is at rest: the attitude from the previous pass, otherwise its mean reading;
-    /// without a table the computed attitude, levelled.
+    /// Linearisation point at rest. With a table, this is the attitude from the previous pass or, in the first pass,
+    /// the mean reading; without a table, it is the computed attitude after levelling.
     ///
-    /// Both are within arc seconds of the truth in every pass, so the noise accumulated over a long
-    /// record never leaves the linear range, and a tilt due to noise does not change the effect of a wrong
+    /// In every pass, both attitudes are within arc seconds of the truth, so the noise accumulated over a long
+    /// recording never leaves the linear range, and a tilt caused by noise does not change the effect of a wrong
     /// heading.
     pub fn tied(&self, computed: &State, accel: &Triad, known: Option<&Matrix3<f64>>) -> State {
         let of_table = self

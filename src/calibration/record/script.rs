@@ -14,7 +14,7 @@ pub struct Script {
     pub events: Vec<Vec<Event>>,
 }
 
-/// Quantities that scale the noise in moves, over all moves.
+/// Quantities that scale the noise in moves, summed over all moves.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Moves {
     /// Duration, s.
@@ -27,7 +27,7 @@ impl Script {
     /// Navigates once through all stretches of a problem, linearised at this point.
     ///
     /// # Errors
-    /// [`CalibrationError::Singular`] if a triad cannot be inverted there.
+    /// Returns [`CalibrationError::Singular`] if a triad cannot be inverted at this point.
     pub fn new(
         problem: &Problem,
         priors: &[AttitudePrior],

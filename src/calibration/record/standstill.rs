@@ -6,8 +6,9 @@ use super::schedule::step_length;
 use crate::imu::{PerSensor, Sensor};
 use crate::run::{Dwell, Run};
 
-/// Floor of the noise of attitude, rad, and velocity, m/s, at standstill. It is small compared with the random
-/// walk of the best instruments over a tenth of a second, so that innovations are not smaller than their stated σ.
+/// Floor of the noise of attitude, rad, and velocity, m/s, at standstill. The floor is small compared with the random
+/// walk of the best instruments over a tenth of a second; it ensures that innovations are not smaller than their stated
+/// σ.
 pub const FLOOR: PerSensor<f64> = PerSensor {
     gyro: 1e-9,
     accel: 1e-7,
@@ -16,7 +17,7 @@ pub const FLOOR: PerSensor<f64> = PerSensor {
 const SIGNIFICANT: f64 = 3.0;
 
 /// White 1σ, at standstill, of the integral of each triad's output, in excess of random walk and pulses: attitude in
-/// rad, velocity in m/s. The values are stated in the run, otherwise estimated from its dwells.
+/// rad, velocity in m/s. These values are stated in the run or, if they are not stated, estimated from the dwells.
 pub fn standstill_sigma(run: &Run, dwells: &[Dwell]) -> PerSensor<f64> {
     PerSensor::from_fn(|sensor| {
         let floor = *FLOOR.get(sensor);

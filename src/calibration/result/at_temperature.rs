@@ -39,7 +39,7 @@ pub enum TemperatureError {
         /// Upper end of the valid range.
         highest: f64,
     },
-    /// A coefficient of an unknown parameter, or of an invalid order.
+    /// A coefficient belongs to an unknown parameter, or its order is invalid.
     #[error(
         "`{0}` in temperature.coefficients is not a parameter with a polynomial of order 1 to 5. Correct the file"
     )]
@@ -47,11 +47,11 @@ pub enum TemperatureError {
 }
 
 impl Calibration {
-    /// The calibration at one constant temperature of all axes, °C, with its covariance there; the result does not
-    /// depend on temperature. A calibration without temperature dependence is returned unchanged.
+    /// The calibration at one constant temperature of all axes, °C, with its covariance at this temperature; the result
+    /// does not depend on temperature. A calibration without temperature dependence is returned unchanged.
     ///
     /// # Errors
-    /// If the temperature is out of range, or a coefficient has an unknown parameter.
+    /// Returns an error if the temperature is out of range, or a coefficient has an unknown parameter.
     pub fn at_temperature(&self, temperature: f64) -> Result<Self, TemperatureError> {
         let Some(thermal) = &self.temperature else {
             return Ok(self.clone());
@@ -73,7 +73,7 @@ impl Calibration {
     /// The calibration for these values of the functions of temperature.
     ///
     /// # Errors
-    /// If a coefficient belongs to no parameter.
+    /// Returns an error if a coefficient belongs to no parameter.
     pub fn in_state(&self, state: &ThermalState) -> Result<Self, TemperatureError> {
         let Some(thermal) = self.thermal()? else {
             return Ok(self.clone());
@@ -112,8 +112,9 @@ impl Calibration {
         })
     }
 
-    /// Covariance of its parameters, normalised by nominal scales: from σ alone if correlations are missing, zero if
-    /// neither is stated. `None` if it does not match the named parameters.
+    /// Covariance of the parameters of the record, normalised by nominal scales. If correlations are missing, the
+    /// covariance follows from σ alone; if σ is missing too, it is zero. `None` if it does not match the named
+    /// parameters.
     pub fn covariance_by(&self, nominal: &PerSensor<Nominal>) -> Option<ParameterMatrix> {
         let form = self.installation_form.unwrap_or_default();
         let factor = |index| factor(nominal, index);

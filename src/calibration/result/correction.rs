@@ -12,34 +12,33 @@ use crate::imu::{
 use crate::recording::{Near, TEMPERATURE_SPACING};
 use crate::run::Run;
 
-/// The correction `u = (K C)⁻¹ (N − D) − t(q)` of a record, in the file's quantity per second.
+/// The correction `u = (K C)⁻¹ (N − D) − t(q)` from a calibration file, in the file's quantity per second.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Correction {
-    /// `K C` of each triad: the file's quantity per second for one rad/s or m/s² along right, front
-    /// and up.
+    /// `K C` of each triad: the file's quantity per second for one rad/s or m/s² along the right, front and up axes.
     pub sensitivity: PerSensor<Matrix3<f64>>,
     /// `(K C)⁻¹`.
     pub matrix: PerSensor<Matrix3<f64>>,
     /// `D`, the file's quantity per second.
     pub bias: PerSensor<Vector3<f64>>,
-    /// Parameters `q` of error terms, in SI; zero if the record has none.
+    /// Parameters `q` of the error terms, in SI units; zero if the calibration file has none.
     pub terms: TermVector,
     /// The record, if it depends on temperature.
     changing: Option<Box<Calibration>>,
 }
 
-/// One sample, calibrated, along right, front and up of the calibration's body frame.
+/// One calibrated sample, along the right, front and up axes of the body frame of the calibration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Calibrated {
     /// Time at which the sample begins, s.
     pub start: f64,
-    /// Time at which it ends, s.
+    /// Time at which the sample ends, s.
     pub end: f64,
     /// Mean angular rate against inertial space, rad/s.
     pub rate: Vector3<f64>,
     /// Mean specific force, m/s².
     pub force: Vector3<f64>,
-    /// Whether its temperature is within the range of the calibration.
+    /// Whether the temperature of the sample is within the range of the calibration.
     pub in_range: bool,
 }
 
@@ -67,7 +66,7 @@ pub enum CorrectionError {
          entry to ignore it"
     )]
     UnknownTerm(String),
-    /// The unit differs from that of the run.
+    /// The unit of the calibration differs from that of the run.
     #[error(
         "the calibration is for {} output in `{calibration}`, but the run uses `{run}`. Give the calibration of this \
          instrument, or correct {}_unit in run.toml", .sensor.name(), .sensor.name()
@@ -80,7 +79,7 @@ pub enum CorrectionError {
         /// Unit of the run.
         run: String,
     },
-    /// The scale differs from that of the run.
+    /// The scale of the calibration differs from that of the run.
     #[error(
         "{} {axis}: the calibration has {calibration:.6e} per {}, but the nominal scale of the run is {run:.6e}. \
          They must have the same sign and agree within a factor of two. Give the calibration of this \
@@ -101,7 +100,7 @@ pub enum CorrectionError {
 }
 
 impl Correction {
-    /// The correction of a record, without constants of the table (`table.…`).
+    /// The correction from a calibration file, without the constants of the table (`table.…`).
     pub fn of_record(record: &Calibration) -> Result<Self, CorrectionError> {
         let sensitivity = PerSensor::from_fn(|sensor| record.triad(sensor).sensitivity());
         let inverse = |sensor: Sensor| {
@@ -134,7 +133,8 @@ impl Correction {
         })
     }
 
-    /// The correction, with a check that the record belongs to the run's instrument: units and nominal scales must agree.
+    /// The correction, after a check that the calibration belongs to the instrument of the run: units and nominal
+    /// scales must agree.
     pub fn for_run(record: &Calibration, run: &Run) -> Result<Self, CorrectionError> {
         let correction = Self::of_record(record)?;
         for sensor in Sensor::ALL {
@@ -175,10 +175,10 @@ impl Correction {
 
     /// Calibrates these samples of a run, in sequence.
     ///
-    /// Error terms are evaluated at the calibrated sample. The angular acceleration for the size effect is the
-    /// difference of the rates before and after; it is zero if the record is not continuous. The time offset
-    /// uses the inertial rate instead of the rate relative to the Earth: the error is 0.7 µg for 10 ms times
-    /// Earth rate.
+    /// Error terms are evaluated with the calibrated sample. The angular acceleration for the size effect is derived
+    /// from the rates before and after the sample; it is zero if the recording is not continuous. The correction for
+    /// the time offset uses the inertial rate instead of the rate relative to the Earth: with Earth rate, the error is
+    /// 0.7 µg for an offset of 10 ms.
     pub fn samples<'a>(
         &'a self,
         run: &'a Run,
@@ -223,8 +223,9 @@ impl Correction {
         })
     }
 
-    /// Angular rate and specific force of one sample of outputs, in the file's quantity per second, for an angular
-    /// acceleration in rad/s² (used by size effect and time offset). Temperature dependence is not applied.
+    /// Angular rate and specific force for one sample of outputs, in the file's quantity per second, with a given
+    /// angular acceleration in rad/s² (used for size effect and time offset). The temperature dependence is not
+    /// applied.
     pub fn of_outputs(
         &self,
         outputs: &PerSensor<Vector3<f64>>,

@@ -1,7 +1,7 @@
 //! A calibration as a file: `calibration.json` and `truth.json`.
 //!
-//! Values are in the file's quantity (see [`crate::imu::Nominal`]): `N = scale ⊙ (installation · u)
-//! + bias`, with `u` in rad/s or m/s² along right-front-up.
+//! Values are in the file's quantity per second (see [`crate::imu::Nominal`]): `N = scale ⊙ (installation · u) + bias`,
+//! with `u` in rad/s or m/s² along the right, front and up axes.
 
 pub(super) mod at_temperature;
 pub(super) mod correction;
@@ -26,9 +26,9 @@ use crate::calibration::{Direction, Finding, Quality, Verdict, Word};
 use crate::imu::{AXES, BodyFrame, InstallationForm, Nominal, Output, PerSensor, Sensor, Triad};
 use crate::run::Aiding;
 
-/// The version of the format.
+/// The version of the file format.
 pub const FORMAT: &str = "turncal-calibration/1";
-/// The version of the format with temperature dependence.
+/// The version of the file format with temperature dependence.
 pub const FORMAT_WITH_TEMPERATURE: &str = "turncal-calibration/2";
 
 /// The equation of a record.
@@ -40,7 +40,7 @@ pub const EQUATION_WITH_TERMS: &str = "N = scale * (installation * (u + t)) + bi
 
 /// A calibration with its accuracy and origin, or a known truth.
 ///
-/// Only the two triads are mandatory. Unknown fields are ignored when reading.
+/// Only the two triads are required. Unknown fields are ignored when reading.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Calibration {
     /// [`FORMAT`], or [`FORMAT_WITH_TEMPERATURE`].
@@ -51,7 +51,7 @@ pub struct Calibration {
     /// Form of the misalignment matrix.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub installation_form: Option<InstallationForm>,
-    /// Observations of the filter; `None` for a method without filter.
+    /// Observations that the filter used; `None` for a method without a filter.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub aiding: Option<Aiding>,
     /// The body frame.
@@ -64,41 +64,42 @@ pub struct Calibration {
     /// The magnetometer, if it was calibrated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mag: Option<MagRecord>,
-    /// Quantity of the file, such as `count`.
+    /// Unit of the file's quantity, such as `count`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<PerSensor<String>>,
-    /// Quantity of a row of the file: for rates N is the row, otherwise the row divided by the sample period.
+    /// Quantity in a row of the file. For rates, N is the row; otherwise, N is the row divided by the sample period.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub output: Option<Output>,
-    /// Columns of the log along x, y and z of each triad, with a minus if the sign is reversed.
+    /// Columns of the log along x, y and z of each triad, with a minus sign if the sign is reversed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub columns: Option<PerSensor<[String; 3]>>,
-    /// 1σ of every value, zero if fixed.
+    /// 1σ of every value; zero if the value is fixed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sigma: Option<PerSensor<TriadRecord>>,
     /// Names of the estimated parameters, such as `gyro.installation.xy`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub parameters: Vec<String>,
-    /// Covariance of the estimated parameters, in their units.
+    /// Covariance of the estimated parameters, in the units of the parameters.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub covariance: Vec<Vec<f64>>,
     /// Uncertainty budget of the parameters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub budget: Option<BudgetRecord>,
-    /// Parameters of error terms, such as `accel.second_order.x`, in SI, and errors of the table,
-    /// such as `table.base.up`, in rad, by name.
+    /// Parameters of error terms (such as `accel.second_order.x`, in SI units) and errors of the table (such as
+    /// `table.base.up`, in rad), by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub terms: BTreeMap<String, TermRecord>,
-    /// Temperature dependence; the values are those at the reference. `None` without temperature dependence.
+    /// Temperature dependence; the values apply at the reference temperature. `None` if the parameters do not depend on
+    /// temperature.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature: Option<ThermalRecord>,
-    /// Results of each of several recordings.
+    /// Results of each recording, if there are several.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub recordings: Vec<RecordingRecord>,
     /// Gravity at the site.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gravity: Option<GravityRecord>,
-    /// Number of passes over the record.
+    /// Number of passes over the recording.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub passes: Option<usize>,
     /// Whether the filter converged.
@@ -110,13 +111,13 @@ pub struct Calibration {
     /// Residuals of gravity and turns.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quality: Option<Quality>,
-    /// Effects of error terms, enabled or not.
+    /// Effects of the error terms, whether enabled or not.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub blocks: Vec<BlockRecord>,
     /// Independent directions of the parameters, the least observed first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub observability: Vec<Direction>,
-    /// The noise that was used; `None` if a file states noise of another kind, as in some truth files.
+    /// The noise that was used; `None` if the file states noise in another form, as some truth files do.
     #[serde(
         default,
         deserialize_with = "if_known",
@@ -126,22 +127,22 @@ pub struct Calibration {
     /// Whether the values may be used; `None` for values that were not estimated, such as a truth.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub verdict: Option<Verdict>,
-    /// Cautions about using the values.
+    /// Cautions for the use of the values.
     #[serde(default)]
     pub warnings: Vec<String>,
-    /// The warnings in structured form: kind, text, figures.
+    /// The warnings in structured form: kind, text and figures.
     #[serde(default)]
     pub findings: Vec<Finding>,
-    /// Names of parameters that were not estimated.
+    /// Names of the parameters that were not estimated.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub fixed: Vec<String>,
     /// The model in words, [`EQUATION`] or [`EQUATION_WITH_TERMS`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub equation: Option<String>,
-    /// The matrix of `u = correction (N − bias)`, ready to use.
+    /// The matrix in `u = correction (N − bias)`, ready to use.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub correction: Option<PerSensor<[[f64; 3]; 3]>>,
-    /// Raw outputs with their calibrated values, to check a user's own code.
+    /// Raw outputs with their calibrated values, with which users can test their own code.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub test_vectors: Vec<TestVector>,
     /// Origin of the calibration.
@@ -162,7 +163,7 @@ pub struct Provenance {
     pub inputs: Vec<InputFile>,
     /// Nominal scales: the file's quantity per second for one rad/s or m/s².
     pub nominal: PerSensor<[f64; 3]>,
-    /// Latitude of the site, degrees; `None` if it is not known.
+    /// Latitude of the site, degrees; `None` if the latitude is not known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub latitude_deg: Option<f64>,
     /// Height of the site, m.
@@ -187,7 +188,7 @@ pub struct InputFile {
 /// The noise that a calibration used.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NoiseRecord {
-    /// Policy, test and sources.
+    /// Noise policy, test of the stated noise, and noise sources.
     #[serde(flatten)]
     pub report: NoiseReport,
     /// The estimated noise as `[imu.noise]`, to be pasted into `run.toml`; `None` if the noise was not estimated.
@@ -218,7 +219,7 @@ pub struct TermRecord {
 pub struct GravityRecord {
     /// Magnitude.
     pub m_s2: f64,
-    /// 1σ, common to the scale factors of all three accelerometers.
+    /// 1σ of gravity; the scale factors of all three accelerometers share this error.
     pub sigma_m_s2: f64,
 }
 
@@ -226,7 +227,7 @@ pub struct GravityRecord {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
-    /// Extended Kalman filter over the whole run
+    /// Extended Kalman filter that uses the whole run
     Ekf,
     /// Closed form from table positions, otherwise from labelled sections, otherwise from gravity
     SixPosition,
@@ -252,7 +253,7 @@ pub struct ConsistencyRecord {
     /// NIS of zero velocity.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub velocity: Option<NisRecord>,
-    /// NIS of the table's attitude.
+    /// NIS of the table attitude.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub table: Option<NisRecord>,
     /// NIS of the constant attitude at standstill, without a table.
@@ -260,10 +261,10 @@ pub struct ConsistencyRecord {
     pub attitude: Option<NisRecord>,
 }
 
-/// Mean normalised innovation squared with its 95 % interval; one if the σ are correct.
+/// Mean normalised innovation squared with its 95 % interval; the mean is one if the σ are correct.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct NisRecord {
-    /// Mean per scalar observation.
+    /// Mean over the scalar observations.
     pub nis: f64,
     /// 95 % interval (χ²).
     pub nis_interval: [f64; 2],
@@ -279,10 +280,10 @@ pub struct BlockRecord {
     /// Probability that the term is present.
     #[serde(default)]
     pub present: f64,
-    /// Largest remaining part of its usual size: from 0 (known) to 1 (not shown).
+    /// Largest remaining part of the usual size of the term, from 0 (known) to 1 (not shown).
     #[serde(default)]
     pub remaining: f64,
-    /// σ with the term divided by σ if it were absent, of gyro K, E, D and accel K, E, D; `None` if there is no σ.
+    /// σ with the term divided by σ without the term, for gyro K, E, D and accel K, E, D; `None` if there is no σ.
     pub sigma_factors: [Option<f64>; 6],
 }
 
@@ -296,8 +297,8 @@ pub struct TestVector {
 }
 
 impl Word {
-    /// Name of a column that contains 1 in every row, such as `verdict_good`, because readers of a table of numbers
-    /// tolerate neither comments nor text.
+    /// Name of a column that contains 1 in every row, such as `verdict_good`. The verdict is in the name because
+    /// programs that read a table of numbers tolerate neither comments nor text.
     pub fn column(self) -> String {
         let word = self.to_string().to_lowercase();
         format!("verdict_{}", word.replace(' ', "_"))
@@ -357,9 +358,9 @@ impl Calibration {
         }
     }
 
-    /// A parameter by name: `gyro.scale.x` and `gyro.bias.x` in the file's quantity,
-    /// `gyro.installation.xy` the entry of the misalignment matrix in that row and column, the same for
-    /// `accel`; `mag.matrix.xy` and `mag.bias.x`; then parameters of error terms such as `accel.time_offset`, in SI.
+    /// A parameter by name: `gyro.scale.x` and `gyro.bias.x` in the file's quantity, `gyro.installation.xy` for the
+    /// entry of the misalignment matrix in that row and column, and likewise for `accel`; `mag.matrix.xy` and `mag.bias.x`; also parameters of error
+    /// terms such as `accel.time_offset`, in SI.
     pub fn get(&self, name: &str) -> Option<&f64> {
         let of_triads = entry(name, |sensor| self.triad(sensor));
         let of_triads = of_triads.or_else(|| self.mag.as_ref()?.get(name));
@@ -419,8 +420,8 @@ impl TriadRecord {
         Matrix3::from_fn(|i, j| self.scale[i] * self.installation[i][j])
     }
 
-    /// The triad, normalised by nominal scales and split in a form. A record may contain any misalignment matrix, so
-    /// the split uses `K C`, which is common to all forms.
+    /// The triad, normalised by nominal scales and split into the parameters of a form. A calibration may contain any
+    /// misalignment matrix, so the split uses `K C`, which is the same in all forms.
     pub fn triad(&self, nominal: &Nominal, form: InstallationForm) -> Triad {
         let sensitivity = self.normalised(nominal);
         let bias = Vector3::from(self.bias).component_div(&nominal.0);

@@ -1,4 +1,4 @@
-//! Consistency of an error with its covariance, correlations included.
+//! Consistency of an error with its covariance, including correlations.
 
 use faer::{Mat, Side};
 use nalgebra::{DMatrix, DMatrixView, DVector, DVectorView};
@@ -10,7 +10,7 @@ use crate::calibration::mean_square_interval;
 /// angles represent six.
 const NO_DIRECTION: f64 = 1e-11;
 
-/// Normalised estimation error squared, as a mean of squares of independent numbers with σ = 1.
+/// Normalised estimation error squared, computed as a mean of squares of independent numbers with σ = 1.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Nees {
     /// NEES/n.
@@ -39,8 +39,7 @@ pub fn nees<'a>(
     })
 }
 
-/// The independent directions of a covariance, found on its correlation matrix so that units do not
-/// matter.
+/// The independent directions of a covariance, found from its correlation matrix so that units do not matter.
 pub struct Directions {
     indices: Vec<usize>,
     sigma: DVector<f64>,
@@ -74,7 +73,7 @@ impl Directions {
         })
     }
 
-    /// Squares of a vector's components along the directions, each in units of its σ.
+    /// Squares of the components of a vector along the directions, each in units of its σ.
     pub fn squares(&self, v: DVectorView<f64>) -> Vec<f64> {
         let z = DVector::from_fn(self.sigma.len(), |i, _| v[self.indices[i]] / self.sigma[i]);
         let along = self.eigenvectors.tr_mul(&z);
@@ -85,7 +84,7 @@ impl Directions {
             .collect()
     }
 
-    /// The inverse of the covariance along its directions, zero across them.
+    /// The inverse of the covariance in its own directions, and zero perpendicular to them.
     pub fn inverse(&self) -> DMatrix<f64> {
         let inverse = self.eigenvalues.map(|variance| {
             let is_direction = variance > NO_DIRECTION;

@@ -158,8 +158,8 @@ impl ClosedForm {
 }
 
 impl AtRest {
-    /// The partial calibration from an instrument at rest: biases of the gyros to within Earth rate, and the
-    /// temperature dependence of all biases; the rest is the prior.
+    /// The partial calibration of an instrument at rest: gyro biases (accurate to Earth rate), and the temperature
+    /// dependence of all biases; all other values come from the prior.
     pub fn record(&self, problem: &Problem) -> Calibration {
         let run = problem.run();
         let (estimate, thermal) = self.biases(problem);
@@ -199,7 +199,7 @@ impl Estimate {
         }
     }
 
-    /// The record of this estimate, with a model card: equation, correction, test vectors.
+    /// The record of this estimate, with a description of the model: equation, correction and test vectors.
     pub fn record(&self, run: &Run, body_frame: BodyFrame) -> Calibration {
         let (form, sigma) = (self.form(), self.sigma());
         let nominal = &run.instrument.nominal;
@@ -252,7 +252,7 @@ pub fn truth_record(truth: &PerSensor<Triad>, run: &Run) -> Calibration {
     }
 }
 
-/// The matrices of `u = correction (N − bias)`, by nominal scales; `None` if one has no inverse.
+/// The matrices in `u = correction (N − bias)`, for these nominal scales; `None` if one has no inverse.
 pub fn correction_of(
     triads: &PerSensor<Triad>,
     nominal: &PerSensor<Nominal>,
@@ -268,7 +268,7 @@ pub fn correction_of(
 }
 
 impl TriadRecord {
-    /// σ of the parameters of both triads, arranged as in the records, by nominal scales.
+    /// σ of the parameters of both triads, arranged as in the records, for these nominal scales.
     pub fn of_both_sigma(
         form: InstallationForm,
         sigma: &ParameterVector,

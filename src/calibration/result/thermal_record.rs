@@ -1,4 +1,4 @@
-//! Temperature dependence of a calibration as stored in a file, and the calibration at one temperature.
+//! Temperature dependence of a calibration in the form stored in a file, and the calibration at one temperature.
 
 use std::collections::BTreeMap;
 
@@ -29,11 +29,11 @@ pub struct ThermalRecord {
     /// Meaning of the figures.
     #[serde(default)]
     pub equation: String,
-    /// Temperature range of each triad; the calibration itself is at the reference.
+    /// Temperature range of each triad; the calibration itself applies at the reference temperature.
     pub range: PerSensor<ThermalRange>,
     /// The coefficients, in the units of their parameters.
     pub coefficients: Vec<CoefficientRecord>,
-    /// Covariance of the coefficients, in this order.
+    /// Covariance of the coefficients, in the same order.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub covariance: Vec<Vec<f64>>,
     /// Covariance of the calibration's `parameters` (rows) with the coefficients.
@@ -49,29 +49,29 @@ pub struct ThermalRecord {
 pub struct CoefficientRecord {
     /// Parameter.
     pub parameter: String,
-    /// The order of its polynomial; `None` for the rate.
+    /// The order of the polynomial; `None` for the rate term.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub order: Option<usize>,
-    /// Value, in the unit of the parameter.
+    /// The value, in the unit of the parameter.
     pub value: f64,
     /// 1σ.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sigma: Option<f64>,
 }
 
-/// One of the recordings of a joint calibration.
+/// One recording of a joint calibration.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RecordingRecord {
     /// Name.
     pub name: String,
-    /// Mean temperature of its dwells, of all axes.
+    /// Mean temperature of all axes over the dwells of the recording.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature_degc: Option<f64>,
-    /// Parameters when calibrated alone, by name; empty if the recording alone gives no calibration.
+    /// Parameters from the recording calibrated alone, by name; empty if this recording alone gives no calibration.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub alone: BTreeMap<String, ValueRecord>,
-    /// Deviation of its parameters from the common ones; `mounting.x` and so on, in rad, is the rotation of the whole
-    /// instrument on its mounting face, about body axes.
+    /// Deviation of the parameters of the recording from the common parameters; `mounting.x` and so on, in rad, is the
+    /// rotation of the whole instrument on its mounting face, about body axes.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub own: BTreeMap<String, ValueRecord>,
 }
@@ -79,7 +79,7 @@ pub struct RecordingRecord {
 /// A value with its 1σ.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ValueRecord {
-    /// Value, in the unit of its parameter.
+    /// The value, in the unit of the parameter.
     pub value: f64,
     /// 1σ.
     pub sigma: f64,

@@ -1,9 +1,10 @@
-//! An instrument that is never turned: its biases against temperature.
+//! Biases against temperature for an instrument that is never turned.
 //!
 //! In one attitude, scale factors, misalignments and the true input are constant, so each output is the bias of its
-//! axis plus an unknown constant. Means over blocks are rows of the same constants as those of a recording with turns,
-//! without navigation: basis, selection of orders, and covariance are the same. Navigation through such a recording
-//! does not converge if the biases wander: over two hours at 0.2 °/s, the innovations are 20 times their σ.
+//! axis plus an unknown constant. Means over blocks give equations for the same constants as a recording with turns,
+//! but without navigation. The temperature functions, the averaging over orders and the covariance are the same.
+//! Navigation through such a recording does not converge if the biases wander: over two hours at 0.2 °/s, the
+//! innovations are 20 times their σ.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -35,7 +36,7 @@ const FEWEST_BLOCKS: f64 = 30.0;
 /// Biases of an instrument at rest against temperature.
 #[derive(Debug, Clone)]
 pub struct AtRest {
-    /// The outputs at the reference temperature in place of the biases; nothing else is estimated.
+    /// The outputs at the reference temperature, which are used as the biases; no other parameters are estimated.
     pub outputs: Estimate,
     /// Change of the biases with temperature.
     pub thermal: Thermal,
@@ -52,9 +53,9 @@ pub struct MeanAtRest {
     pub temperature: f64,
     /// Rate, K/s.
     pub rate: f64,
-    /// Output minus that at the reference, normalised, rad/s or m/s².
+    /// Normalised output minus the output at the reference temperature, rad/s or m/s².
     pub change: f64,
-    /// Residual from the polynomial.
+    /// Residual relative to the polynomial.
     pub residual: f64,
 }
 
@@ -71,8 +72,8 @@ struct Block {
 }
 
 impl Problem<'_> {
-    /// The biases against temperature, if the instrument is never turned: `None` with several dwells or recordings,
-    /// without temperature, or if it changes too little.
+    /// The biases as a function of temperature, if the instrument is never turned. `None` if there are several dwells
+    /// or recordings, if there is no temperature, or if the temperature changes too little.
     pub fn at_rest(&self) -> Option<AtRest> {
         let run = self.run();
         if self.dwells().nth(1).is_some() || self.runs().nth(1).is_some() {
@@ -250,7 +251,7 @@ fn not_turned(model: &Model) -> impl Iterator<Item = Finding> {
         of.filter_map(|index| parameter_name(model.form, index))
             .collect()
     };
-    let by = "a recording at rest in one attitude";
+    let by = "only a recording at rest in one attitude";
     let hidden = names(&|sensor, is_bias| !is_bias || sensor == Sensor::Accel);
     let turned = names(&|_, is_bias| !is_bias);
     let findings = [not_observed(by, hidden), temperature_not_seen(turned)];
@@ -258,8 +259,8 @@ fn not_turned(model: &Model) -> impl Iterator<Item = Finding> {
 }
 
 impl AtRest {
-    /// The estimate with both triads, and its temperature dependence: biases of the gyros to within Earth rate, all
-    /// others from the prior, because they cannot be separated from the input.
+    /// The estimate of both triads, and its temperature dependence: the biases of the gyros (accurate to Earth rate);
+    /// all other values are those of the prior, because they cannot be separated from the input.
     pub fn biases(&self, problem: &Problem) -> (Estimate, Thermal) {
         let model = &problem.model;
         let variances = model.prior_sigma.map(|sigma| sigma.powi(2));

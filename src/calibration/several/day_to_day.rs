@@ -13,8 +13,9 @@ use crate::units::ARCSEC;
 /// Effect of a rotation of the instrument on its mounting face: derivatives of the recording's parameters.
 #[derive(Debug, Clone)]
 pub struct Turned {
-    /// Derivatives with respect to the common parameters, one column each. The poorly determined mean of all mountings
-    /// depends on well-determined quantities, so the accuracy of the derivatives must match the ratio of the two.
+    /// Derivatives with respect to the common parameters, one column per parameter. The poorly determined mean of all
+    /// mountings depends on well-determined quantities, so the relative accuracy of the derivatives must be better than
+    /// the ratio of their σ.
     pub by_parameters: ParameterMatrix,
     /// Derivatives with respect to the rotation about each body axis.
     pub by_mounting: SMatrix<f64, PARAMETERS, 3>,
@@ -29,13 +30,13 @@ pub struct DayToDay {
     pub mounting: f64,
 }
 
-/// Deviation of one recording from the common parameters, or its 1σ.
+/// Deviation of one recording from the common parameters, or the 1σ of this deviation.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Difference {
     /// Deviation added to each parameter, normalised.
     pub parameters: ParameterVector,
-    /// Rotation vector ψ of the whole instrument on its mounting face, body axes, rad: for the input u of the face, the
-    /// instrument senses `R(ψ)ᵀ u`.
+    /// Rotation vector ψ of the whole instrument on its mounting face, body axes, rad: for an input u along the axes of
+    /// the face, the instrument senses `R(ψ)ᵀ u`.
     pub mounting: Vector3<f64>,
 }
 
@@ -54,12 +55,12 @@ const MOUNTING: &str = "mounting_arcsec";
 const ROUNDS: usize = 3;
 
 impl DayToDay {
-    /// Whether any quantity differs.
+    /// Whether any quantity differs between recordings.
     pub fn any(&self) -> bool {
         self.parameters.amax() > 0.0 || self.mounting > 0.0
     }
 
-    /// The key of a group in a campaign's `[day_to_day]`, and its unit in SI.
+    /// The key of a parameter group in `[day_to_day]` of a campaign, and its unit in SI.
     pub fn key(group: Group) -> (String, f64) {
         let entry = group.entry();
         (
@@ -87,7 +88,7 @@ impl DayToDay {
         differ
     }
 
-    /// The values in `[day_to_day]` with their keys; those of a group are equal.
+    /// The values in `[day_to_day]` with their keys; all parameters of a group have the same value.
     pub fn values(&self) -> impl Iterator<Item = (String, f64)> {
         let of_groups = Group::all().filter_map(|group| {
             let (key, unit) = Self::key(group);

@@ -1,9 +1,9 @@
-//! Several recordings of one instrument as one problem: common parameters are estimated once, differences between
-//! recordings have a stated σ, and parameters may depend on temperature.
+//! Joint calibration of several recordings of one instrument: common parameters are estimated once, differences between
+//! recordings have a σ, and parameters may depend on temperature.
 //!
-//! Each recording is first calibrated alone, on its own thread. Polynomials through these estimates are the start of
-//! the iterations on all data, with all orders that the temperatures support; the result is averaged over the presence
-//! and absence of each order.
+//! Each recording is first calibrated alone, on its own thread. The iterations on all data start from polynomials
+//! through these estimates, with all orders that the temperatures support; the result is averaged over the presence and
+//! absence of each order.
 
 pub mod at_rest;
 pub mod day_to_day;
@@ -28,7 +28,7 @@ pub use temperatures::TemperatureOptions;
 /// Common and individual properties of recordings of one instrument.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Together {
-    /// σ of their differences. Without a table, the body axes are those of the accelerometers for any mounting.
+    /// σ of their differences. Without a table, the accelerometers define the body axes, regardless of the mounting.
     pub day_to_day: DayToDay,
     /// Temperature dependence of the parameters; `None` if there is none.
     pub temperature: Option<TemperatureOptions>,
@@ -44,12 +44,12 @@ impl Default for Together {
 }
 
 impl<'a> Problem<'a> {
-    /// The joint problem of several recordings of one instrument. The instrument and table of the first apply to all; a
-    /// recording without a dwell is excluded with a finding.
+    /// The joint problem of several recordings of one instrument. The instrument and table of the first recording apply
+    /// to all; a recording without a dwell is excluded with a finding.
     ///
     /// # Errors
-    /// [`CalibrationError`] if there is no recording, or if a recording has no temperature although parameters depend
-    /// on temperature.
+    /// Returns [`CalibrationError`] if there is no recording, or if a recording has no temperature although parameters
+    /// depend on temperature.
     pub fn together(
         runs: &[&'a Run],
         options: &Options,
@@ -83,14 +83,14 @@ pub struct Start {
     pub at: Linearisation,
     /// Prior of the initial attitude of each stretch.
     pub priors: Vec<AttitudePrior>,
-    /// Each recording calibrated alone, if there are several or their temperatures differ.
+    /// Each recording calibrated alone, if there are several recordings or their temperatures differ.
     pub alone: Vec<SeparateEstimate>,
 }
 
-/// The start of a problem: the coarse start of a single recording, or the separate estimates of several.
+/// The start of a problem: the coarse start of a single recording, or the separate estimates of several recordings.
 ///
 /// # Errors
-/// [`CalibrationError`] if a recording has no start.
+/// Returns [`CalibrationError`] if a recording has no start.
 pub fn start(problem: &Problem) -> Result<Start, CalibrationError> {
     if !problem.varies() && problem.runs().nth(1).is_none() {
         let CoarseStart { at, attitudes, .. } = coarse_start(problem)?;

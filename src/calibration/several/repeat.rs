@@ -1,4 +1,4 @@
-//! Repeatability: each recording calibrated alone, compared with the joint calibration.
+//! Repeatability, from a comparison of each recording calibrated alone with the joint calibration.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -19,7 +19,7 @@ pub struct Repeatability {
     pub claimed: f64,
     /// χ² of the deviations per degree of freedom; one if the σ are correct.
     pub chi_square: f64,
-    /// Limit at a false-alarm rate of 0.1 %.
+    /// Limit of χ² per degree of freedom, for a false-alarm rate of 0.1 %.
     pub limit: f64,
 }
 
@@ -42,7 +42,7 @@ impl Outcome {
     }
 
     /// Squared normalised distance between a recording calibrated alone and the joint calibration, per parameter, and
-    /// its limit at a false-alarm rate of 0.1 %. `None` if the recording gives no calibration alone.
+    /// its limit at a false-alarm rate of 0.1 %. Returns `None` if the recording alone gives no calibration.
     pub fn distance_alone(&self, number: usize) -> Option<(f64, f64)> {
         let alone = self.alone.get(number)?;
         let off = self.departure(number, alone)?;

@@ -1,4 +1,4 @@
-//! Each recording of a problem calibrated alone.
+//! Separate calibration of each recording of a problem.
 
 use std::sync::Arc;
 
@@ -30,9 +30,9 @@ pub struct SeparateEstimate {
     pub name: String,
     /// Mean temperature of each axis, °C, and its rate, K/s, over its dwells; `None` if unknown.
     pub temperature: Option<PerSensor<[f64; 3]>>,
-    /// The span of its temperatures, K.
+    /// The temperature range within the recording, K.
     pub span: f64,
-    /// Calibration at that temperature; `None` if it failed.
+    /// Calibration at the mean temperature; `None` if the calibration failed.
     pub estimate: Option<Estimate>,
     /// Functions of temperature, if its temperature is constant.
     pub(in crate::calibration) state: Option<ThermalState>,
@@ -126,8 +126,8 @@ fn middle_temperature(recording: &Problem) -> Option<PerSensor<[f64; 3]>> {
     }))
 }
 
-/// For a parameter: the common deviation from its prior mean, and the coefficient of each function of temperature, by
-/// least squares through the recordings calibrated alone.
+/// For each parameter, the common deviation from its prior mean and the coefficient of each function of temperature,
+/// from a least-squares fit to the recordings calibrated alone.
 pub fn through(
     model: &Model,
     alone: &[SeparateEstimate],

@@ -40,7 +40,7 @@ impl Default for TemperatureOptions {
     }
 }
 
-/// The polynomials supported by the dwell temperatures of a problem; `None` for a single temperature.
+/// The polynomials that the dwell temperatures of a problem support; `None` for a single temperature.
 pub fn model(
     problem: &Problem,
     options: TemperatureOptions,

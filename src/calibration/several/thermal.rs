@@ -40,7 +40,7 @@ impl Coefficient {
         .collect()
     }
 
-    /// Index of its parameter among those of both triads.
+    /// Index of the parameter among those of both triads.
     pub fn index(&self) -> usize {
         parameter(self.sensor, self.parameter)
     }
@@ -68,7 +68,7 @@ impl Coefficient {
 pub struct Thermal {
     /// Temperature ranges and prior σ.
     pub model: ThermalModel,
-    /// The coefficient of each estimate.
+    /// The coefficient to which each estimate belongs.
     pub coefficients: Vec<Coefficient>,
     /// The estimates, normalised like the parameters.
     pub values: DVector<f64>,
@@ -79,7 +79,7 @@ pub struct Thermal {
 }
 
 impl Thermal {
-    /// The coefficients of both triads; zero if off.
+    /// The coefficients of both triads; zero if the function is off.
     pub fn coefficients(&self) -> PerSensor<ThermalCoefficients> {
         let mut all = PerSensor::<ThermalCoefficients>::default();
         for (coefficient, value) in self.coefficients.iter().zip(&self.values) {
@@ -88,8 +88,8 @@ impl Thermal {
         all
     }
 
-    /// Deviation of the parameters of both triads from those at the reference in a state, and the covariance of the
-    /// parameters in that state, given the covariance at the reference.
+    /// Returns, for a thermal state, the deviation of the parameters of both triads from the values at the reference
+    /// and the covariance of the parameters, given the covariance at the reference.
     pub fn at(
         &self,
         state: &ThermalState,

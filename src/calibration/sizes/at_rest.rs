@@ -1,7 +1,7 @@
-//! The noise at rest, from the dwells alone.
+//! Estimation of the noise at rest from the dwells alone.
 //!
-//! Each part of a dwell has its own free initial states and constant rates and forces, so the residuals show white
-//! noise, sway and turning by hand for any parameters.
+//! Each part of a dwell has its own free initial states and its own constant rates and forces, so the residuals show
+//! white noise, sway and rotation by hand independently of the parameters.
 
 use std::convert::Infallible;
 
@@ -28,7 +28,7 @@ const LEAST: f64 = -4.605_170_185_988_091;
 
 /// The noise at rest.
 pub struct NoiseAtRest {
-    /// Logarithms of the common sizes over the usual ones.
+    /// Logarithms of the common sizes divided by the usual sizes.
     pub logs: DVector<f64>,
     /// 1σ of each logarithm.
     pub sigma: DVector<f64>,
@@ -252,8 +252,8 @@ impl Left {
     }
 }
 
-/// The most likely noise at rest in the median dwell, each size with its prior; starts from the noise at an earlier
-/// linearisation point, if any.
+/// The most likely noise at rest in the median dwell, with a prior for each size. The search starts from the noise at
+/// an earlier linearisation point, if there is one.
 pub fn likeliest(
     problem: &Problem,
     script: &Script,

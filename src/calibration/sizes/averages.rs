@@ -1,10 +1,10 @@
-//! Average over effects that may be absent and whose size is not known: error terms, temperature orders.
+//! Average over effects that may be absent and whose size is not known, such as error terms and temperature orders.
 //!
-//! A group of constants is absent with probability one half; otherwise it has its usual size, known to a factor of
-//! three. The posterior of all constants is the average over these cases. With many groups, the average is found as in
+//! A group of constants is absent with a prior probability, usually one half; otherwise it has its usual size, known to
+//! a factor of three. The posterior of all constants is the average over these cases. With many groups, the average is found as in
 //! expectation propagation (Minka 2001, "Expectation propagation for approximate Bayesian inference", UAI 17): each
 //! group gets the normal prior about zero for which its mean equals that of the average over its own cases, given the
-//! priors of all others. The covariance is then that within the cases plus that between the cases.
+//! priors of all others. The covariance is then the covariance within the cases plus the covariance between the cases.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -21,12 +21,12 @@ const SIZES: [(f64, f64); 7] = [
     (3.0, 2.0 / 16.0),
     (5.196_152_422_706_632, 1.0 / 16.0),
 ];
-/// The largest size over the usual one.
+/// The largest size divided by the usual size.
 pub const LARGEST: f64 = SIZES[6].0;
 /// Smallest variance of a prior: an absent constant is zero to a millionth of its usual size.
 const NOTHING: f64 = 1e-12;
-/// Prior probability that a group is absent.
-const ABSENT: f64 = 0.5;
+/// Prior probability that a group is absent, if nothing is known.
+pub const ABSENT: f64 = 0.5;
 /// Maximum number of rounds over all groups.
 const ROUNDS: usize = 100;
 /// The average has settled if no probability of absence changes by more than this.
@@ -40,8 +40,10 @@ pub struct Average {
     /// Covariance between the cases of each group, multiplied from both sides by the inverse covariance within the
     /// cases.
     pub between: DMatrix<f64>,
-    /// Probability that each group is absent.
+    /// Probability of absence for each group.
     pub absent: Vec<f64>,
+    /// The same, without data.
+    prior_absent: Vec<f64>,
 }
 
 /// A mean with its covariance.
@@ -51,8 +53,9 @@ struct Moments {
 }
 
 impl Average {
-    /// Every group present with this size over the usual one.
-    pub fn begun(groups: &[Vec<usize>], sizes: &[f64]) -> Self {
+    /// A starting point in which every group is present, with this size divided by the usual size, and with its prior
+    /// probability of absence.
+    pub fn begun(groups: &[Vec<usize>], sizes: &[f64], prior_absent: Vec<f64>) -> Self {
         let n = groups.iter().map(Vec::len).sum();
         let mut precision = DMatrix::zeros(n, n);
         for (places, size) in groups.iter().zip(sizes) {
@@ -63,19 +66,21 @@ impl Average {
         Self {
             precision,
             between: DMatrix::zeros(n, n),
-            absent: vec![ABSENT; groups.len()],
+            absent: prior_absent.clone(),
+            prior_absent,
         }
     }
 
-    /// The average, given the information of the data on all groups, each with its positions among the constants,
-    /// starting from this average; `None` if the covariance of a group is not positive definite.
+    /// The average, given the information on all groups from the data; the calculation starts from this average. Each
+    /// group is given by its positions among the constants. Returns `None` if the covariance of a group is not positive
+    /// definite.
     pub fn given(mut self, data: &Information, groups: &[Vec<usize>]) -> Option<Self> {
         for _ in 0..ROUNDS {
             let mut now = self.moments(data)?;
             let mut most = 0.0f64;
             for (k, places) in groups.iter().enumerate() {
                 let others = self.others(places, &now)?;
-                let cases = Cases::of(&others);
+                let cases = Cases::of(&others, self.prior_absent[k]);
                 most = most.max((cases.absent - self.absent[k]).abs());
                 self.absent[k] = cases.absent;
                 set(&mut self.between, places, &cases.between);
@@ -146,20 +151,20 @@ struct Cases {
 }
 
 impl Cases {
-    fn of(others: &Information) -> Self {
+    fn of(others: &Information, prior_absent: f64) -> Self {
         let n = others.vector.len();
         // Computed along the directions that the others determine independently.
         let turned = others.matrix.clone().symmetric_eigen();
         let said = turned.eigenvectors.tr_mul(&others.vector);
         let known = turned.eigenvalues.map(|value| value.max(0.0));
-        let mut weights = vec![ABSENT.ln()];
+        let mut weights = vec![prior_absent.ln()];
         let mut variances = vec![DVector::zeros(n)];
         for (size, weight) in SIZES {
             let variance = known.map(|known| (known + size.powi(-2)).recip());
             let likelihood: f64 = (0..n)
                 .map(|k| variance[k] * said[k].powi(2) - (1.0 + size.powi(2) * known[k]).ln())
                 .sum();
-            weights.push(((1.0 - ABSENT) * weight).ln() + 0.5 * likelihood);
+            weights.push(((1.0 - prior_absent) * weight).ln() + 0.5 * likelihood);
             variances.push(variance);
         }
         let largest = weights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -228,7 +233,7 @@ mod tests {
     }
 
     fn by_propagation(data: &Information, groups: &[Vec<usize>]) -> Whole {
-        let found = Average::begun(groups, &vec![1.0; groups.len()])
+        let found = Average::begun(groups, &vec![1.0; groups.len()], vec![ABSENT; groups.len()])
             .given(data, groups)
             .unwrap();
         let Moments { mean, covariance } = found.moments(data).unwrap();

@@ -1,8 +1,8 @@
-//! Constants that may be absent, averaged over absence and their sizes.
+//! Averaging over the absence and the sizes of constants that may be absent.
 
 use nalgebra::{DMatrix, DVector};
 
-use super::averages::Average;
+use super::averages::{ABSENT, Average};
 use crate::calibration::constants::{Information, Sites};
 use crate::calibration::{Candidate, Constant, Known, Model, Prior};
 
@@ -105,8 +105,13 @@ fn begun(all: &[Candidate], places: &[Vec<usize>]) -> Average {
         Candidate::Order(..) => 1.0,
         Candidate::Term(_) | Candidate::EarthRate => NEXT_TO_ABSENT,
     };
+    // Every parameter changes with temperature; if it is warmed only once, its rate of change has the same effect.
+    let absent = |of: &Candidate| match of {
+        Candidate::Order(_, _, 0) => 0.0,
+        _ => ABSENT,
+    };
     let sizes: Vec<f64> = all.iter().map(size).collect();
-    Average::begun(places, &sizes)
+    Average::begun(places, &sizes, all.iter().map(absent).collect())
 }
 
 /// Usual size of each constant that may be absent, and its value at the linearisation point.

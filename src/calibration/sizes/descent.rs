@@ -1,4 +1,4 @@
-//! Descent of a cost with its gradient, in a few logarithms of sizes.
+//! Minimisation of a cost, given with its gradient, as a function of a few logarithms of sizes.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -16,12 +16,12 @@ const STEPS: usize = 30;
 pub struct Slope {
     pub cost: f64,
     pub gradient: DVector<f64>,
-    /// Approximation of the second derivatives, positive definite.
+    /// Positive-definite approximation of the second derivatives.
     pub curvature: DMatrix<f64>,
 }
 
 impl Slope {
-    /// A point where the cost is not defined.
+    /// A point at which the cost is not defined.
     pub fn nowhere(size: usize) -> Self {
         Self {
             cost: f64::INFINITY,
@@ -53,7 +53,7 @@ impl Lowest {
     }
 }
 
-/// The lowest point found from a start, by Newton steps with the expected curvature (Fisher scoring).
+/// The lowest point found from a start by Newton steps with the expected curvature (Fisher scoring).
 pub fn descend<E>(
     start: DVector<f64>,
     mut slope_at: impl FnMut(&DVector<f64>) -> Result<Slope, E>,

@@ -1,4 +1,4 @@
-//! Sizes of the effects between dwells from the restricted likelihood, each with a prior.
+//! Estimation of the sizes of the effects between dwells by restricted likelihood, with a prior for each size.
 
 use std::collections::BTreeMap;
 
@@ -23,9 +23,9 @@ const LONGEST: f64 = 1.0;
 /// Sizes of effects and of single events.
 #[derive(Debug, Clone)]
 pub struct At {
-    /// Logs of σ over the usual σ with which the links were made.
+    /// Logarithms of σ divided by the usual σ with which the links were made.
     pub logs: DVector<f64>,
-    /// Variances of events, divided by those of their effects.
+    /// Variances of single events, divided by the variances of their effects.
     pub events: Sizes,
 }
 
@@ -48,7 +48,7 @@ pub struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    /// Variances, divided by those with which the links were made.
+    /// Variances, divided by the variances with which the links were made.
     pub fn sizes(&self, at: &At) -> Sizes {
         let pairs = self.usual.iter().zip(&at.logs);
         pairs.fold(at.events.clone(), |sizes, (of, by)| match of.effect() {
@@ -84,15 +84,16 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// The most likely sizes from a start, with these sites of the constants that may be absent.
+    /// The most likely sizes, found from a start with these normal priors (`sites`) of the constants that may be
+    /// absent.
     ///
     /// One forward and one backward pass give the cost, the gradient and the most likely variance of each event
-    /// (Koopman and Shephard 1992). Each event of an effect with heavy tails has its own variance, so that an event
-    /// larger than the others stands out instead of increasing the σ of all (Lange, Little, Taylor 1989, J. Am. Stat.
-    /// Assoc. 84(408)). Each step lowers the cost.
+    /// (Koopman and Shephard 1992). Each event of an effect with heavy tails has its own variance, so that an unusually
+    /// large event does not increase the σ of all events (Lange, Little, Taylor 1989, J. Am. Stat. Assoc. 84(408)).
+    /// Each step lowers the cost.
     ///
     /// # Errors
-    /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
+    /// Returns [`CalibrationError::Diverged`] if a covariance is not positive definite.
     pub fn likeliest(&self, start: At, sites: &Sites) -> Result<Here<'a>, CalibrationError> {
         let mut here = self.here(start, sites)?;
         for _ in 0..STEPS {
@@ -164,9 +165,9 @@ impl Here<'_> {
 }
 
 impl At {
-    /// The usual sizes, with slips as large as position errors: a slip that explains as much as all later positions is
-    /// tried first, and shrinks if it is not needed (graduated non-convexity: Blake and Zisserman, *Visual
-    /// Reconstruction*, ch. 7).
+    /// The usual sizes, with slips as large as position errors. The search thus first tries a slip that explains as
+    /// much as all later positions, and reduces the size if slips are not needed (graduated non-convexity: Blake and
+    /// Zisserman, *Visual Reconstruction*, ch. 7).
     pub fn usual(usual: &[Usual], chain: &Chain) -> Self {
         let drives = chain.links.iter().flat_map(|link| &link.transition.drives);
         let slips = drives.filter(|drive| matches!(drive.effect, Effect::Slip(_)));

@@ -48,11 +48,11 @@ struct Size {
 /// Distance of a linearisation point from the estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stage {
-    /// Errors of the linearisation dominate the residuals.
+    /// The point is far from the estimate: errors of the linearisation dominate the residuals.
     Far,
-    /// Near for the first time.
+    /// The point is near the estimate for the first time.
     FirstNear,
-    /// Near, as in the previous pass.
+    /// The point is near the estimate, as in the previous pass.
     Near,
 }
 
@@ -77,7 +77,7 @@ pub struct Weighed<'a> {
 }
 
 impl Effects {
-    /// The sizes as stated.
+    /// The stated sizes.
     pub fn new(problem: &Problem) -> Self {
         let constants = Constant::all(&problem.model, problem.one_gravity());
         Self {
@@ -90,10 +90,10 @@ impl Effects {
         }
     }
 
-    /// Improves the sizes at a linearisation point, in several rounds once the point is near.
+    /// Improves the sizes at a linearisation point; once the point is near, in several rounds.
     ///
     /// # Errors
-    /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
+    /// Returns [`CalibrationError::Diverged`] if a covariance is not positive definite.
     pub fn improve(
         &mut self,
         problem: &Problem,
@@ -193,7 +193,7 @@ impl Effects {
     /// The chain at a linearisation point.
     ///
     /// # Errors
-    /// [`CalibrationError::Diverged`] if a part of a dwell cannot be reduced.
+    /// Returns [`CalibrationError::Diverged`] if a part of a dwell cannot be reduced.
     pub fn chain(&self, problem: &Problem, script: &Script) -> Result<Chain, CalibrationError> {
         let made = problem.with(|model| self.set(model, |_| 0.0));
         Chain::new(&made, script, &self.dispersion)
@@ -202,7 +202,7 @@ impl Effects {
     /// Information on the constants from a filter with these sizes between dwells.
     ///
     /// # Errors
-    /// [`CalibrationError::Diverged`] if a part cannot be reduced, or a covariance is not positive definite.
+    /// Returns [`CalibrationError::Diverged`] if a part cannot be reduced, or a covariance is not positive definite.
     pub fn information(
         &self,
         problem: &Problem,
@@ -216,7 +216,7 @@ impl Effects {
     /// A chain with its sizes and its information on the constants.
     ///
     /// # Errors
-    /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
+    /// Returns [`CalibrationError::Diverged`] if a covariance is not positive definite.
     pub fn weighed<'a>(
         &self,
         chain: &'a Chain,
@@ -238,10 +238,10 @@ impl Effects {
         })
     }
 
-    /// Does the same as [`Self::weighed`] for some of the rows; the candidates are averaged again.
+    /// Does the same as [`Self::weighed`] for some of the rows, and averages the candidates again.
     ///
     /// # Errors
-    /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
+    /// Returns [`CalibrationError::Diverged`] if a covariance is not positive definite.
     pub fn weighed_anew<'a>(
         &self,
         chain: &'a Chain,
@@ -255,7 +255,8 @@ impl Effects {
         anew.weighed(chain, problem, script)
     }
 
-    /// Variances, divided by those with which the links of a chain are made; with stated noise, there are no slips.
+    /// Variances, divided by the variances with which the links of a chain are made; with stated noise, slips are
+    /// excluded.
     pub fn sizes(&self, chain: &Chain) -> Sizes {
         if self.at_rest.is_empty() && self.between.is_empty() {
             let slips = chain.states.slips.is_some();
@@ -284,7 +285,7 @@ impl Effects {
             .for_each(|size| size.usual.set(model, log(size)));
     }
 
-    /// A model with all sizes.
+    /// A copy of the model that contains all sizes.
     pub fn model(&self, stated: &Model) -> Model {
         let mut model = stated.clone();
         self.set(&mut model, |size| size.log);
@@ -329,7 +330,7 @@ impl Effects {
     /// Differences between recordings beyond the stated ones, from a chain with these sizes.
     ///
     /// # Errors
-    /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
+    /// Returns [`CalibrationError::Diverged`] if a covariance is not positive definite.
     pub fn differences(
         &self,
         of: &Weighed,

@@ -7,7 +7,7 @@ use crate::calibration::record::script::Moves;
 use crate::calibration::{Group, Model, Problem, Source};
 use crate::run::Aiding;
 
-/// Prior 1σ of the log σ of a stated figure: a factor of three.
+/// Prior 1σ of the logarithm of a stated σ: a factor of three.
 pub const LOG_SIGMA: f64 = 1.098_612_288_668_109_8;
 /// Prior 1σ of the log σ of an unstated figure, about the effect of white noise: a factor of ten.
 const LOG_SIGMA_NOT_STATED: f64 = std::f64::consts::LN_10;
@@ -24,7 +24,7 @@ const DIFFERENCE: f64 = 0.1;
 pub enum What {
     /// A source of noise.
     Noise(Source),
-    /// The time in which a table settles.
+    /// The time constant with which a table settles.
     SettlingTime,
     /// The difference between recordings of a group of parameters.
     Difference(Group),
@@ -34,7 +34,7 @@ pub enum What {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Usual {
     pub what: What,
-    /// Usual size in SI and radians; for a difference, as a fraction of the prior σ of each parameter.
+    /// Usual size in SI units and radians; for a difference, a fraction of the prior σ of each parameter.
     pub sigma: f64,
     /// 1σ of its logarithm.
     pub spread: f64,
@@ -94,7 +94,7 @@ impl Usual {
         })
     }
 
-    /// The effect of the chain that this size scales; `None` if the source acts within dwells alone.
+    /// The effect of the chain that this size scales; `None` if the source acts only within dwells.
     pub fn effect(&self) -> Option<Effect> {
         match self.what {
             What::SettlingTime => None,

@@ -1,4 +1,4 @@
-//! Both triads from positions.
+//! Estimation of both triads from positions.
 
 use super::positions::{Fit, Observed};
 use crate::calibration::checks::prior_distance::{far_from_prior, widened};
@@ -11,8 +11,8 @@ use crate::run::Aiding;
 /// An axis counts as working if its scale factor is farther from zero than this many σ.
 const SENSES: f64 = 5.0;
 
-/// Both triads from positions, with the prior for parameters that the positions do not determine. If the positions
-/// alone contradict the prior, it is widened, with a finding.
+/// Estimates both triads from positions, with the prior for parameters that the positions do not determine. If the
+/// positions alone contradict the prior, the prior is widened, with a finding.
 pub fn both_triads(
     observed: &PerSensor<Observed>,
     problem: &Problem,

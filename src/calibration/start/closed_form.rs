@@ -30,9 +30,9 @@ const ALONG_AXIS: f64 = 0.9998;
 /// Source of the reference inputs of a closed form.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reference {
-    /// Attitudes of the table's log.
+    /// The attitudes in the table log.
     Table,
-    /// Labels of sections: an axis up, a turn about an axis by an angle.
+    /// Labels of sections, each of which states the upward axis or a turn.
     Labels,
     /// Only gravity: its magnitude at rest and its direction before and after each turn.
     Gravity,
@@ -59,9 +59,9 @@ pub struct ClosedForm {
     pub magnetic: Option<MagneticEstimate>,
     /// Source of the reference inputs.
     pub reference: Reference,
-    /// Dwells or labelled positions used for each triad.
+    /// Number of dwells or labelled positions used for each triad.
     pub positions: PerSensor<usize>,
-    /// Turns used for the gyros.
+    /// Number of turns used for the gyros.
     pub turns: usize,
     /// Total time of all dwells used, s.
     pub standing_time: f64,
@@ -81,10 +81,11 @@ impl ClosedForm {
 /// With a table log, the closed form uses the dwells: the six positions of the paper for a triad (Earth rate or gravity
 /// along each body axis, in both directions) if present, otherwise all dwells. Without a table, the closed form uses
 /// labelled sections or, without labels, every dwell and turn with gravity as the only reference. For exactly opposite
-/// positions, least squares equals the half sums and half differences of the paper.
+/// positions, least squares gives the half sums and half differences of the paper.
 ///
 /// # Errors
-/// [`CalibrationError`] if there is no dwell. Parameters that the positions do not determine keep their prior.
+/// Returns [`CalibrationError`] if there is no dwell. Parameters that the positions do not determine keep their prior
+/// values.
 pub fn six_position(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
     let sections = &problem.run().recording.segments;
     let reference = if problem.model.aiding == Aiding::Table {
@@ -139,7 +140,7 @@ fn share_gravity(estimate: &mut Estimate, site: &Site) {
 /// The closed form from dwells (or parts of dwells) of the first run of the problem, with table attitudes.
 ///
 /// # Errors
-/// As [`six_position`], and if there is no table.
+/// The errors of [`six_position`], and an error if there is no table.
 pub fn six_position_of(
     problem: &Problem,
     dwells: &[Dwell],

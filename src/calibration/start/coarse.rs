@@ -1,4 +1,5 @@
-//! The coarse start: the linearisation point of the first pass. It does not change the prior of the filter.
+//! The coarse start: the linearisation point of the first pass. The coarse start does not change the prior of the
+//! filter.
 
 use nalgebra::Matrix3;
 
@@ -39,20 +40,20 @@ pub struct CoarseStart {
 }
 
 impl CoarseStart {
-    /// A problem with the noise of turning and holding by hand found at the start; `None` if there is none.
+    /// A copy of the problem with the hand noise found at the start; `None` if there is no such noise.
     pub fn by_hand<'a>(&self, problem: &Problem<'a>) -> Option<Problem<'a>> {
         let by_hand = self.by_hand.as_ref()?;
         Some(problem.with_model(by_hand.model(problem)))
     }
 }
 
-/// Both triads and the initial attitudes by least squares over whole dwells and moves.
+/// Estimates both triads and the initial attitudes by least squares over whole dwells and moves.
 ///
 /// With a table, the attitudes are known. Without a table, the accelerometers follow from `|f| = g` in the dwells, the
 /// gyros from the gravity direction before and after each move, and gyro biases and heading from the rates at rest.
 ///
 /// # Errors
-/// [`CalibrationError`] if there is no dwell, or data and prior contradict each other.
+/// Returns [`CalibrationError`] if there is no dwell, or data and prior contradict each other.
 pub fn coarse_start(problem: &Problem) -> Result<CoarseStart, CalibrationError> {
     let dwells = dwells(problem)?;
     if let Some(attitudes) = attitudes_of_table(problem) {
@@ -105,7 +106,7 @@ fn attitudes_of_table(problem: &Problem) -> Option<Vec<AttitudePrior>> {
         .collect()
 }
 
-/// The dwells of each stretch; an error if there are none.
+/// The dwells of each stretch; an error if there are no dwells.
 pub fn dwells(problem: &Problem) -> Result<Vec<Vec<AtRest>>, CalibrationError> {
     let dwells = AtRest::all(problem);
     match dwells.iter().flatten().count() {
@@ -114,7 +115,7 @@ pub fn dwells(problem: &Problem) -> Result<Vec<Vec<AtRest>>, CalibrationError> {
     }
 }
 
-/// Both triads and attitudes from gravity and the rates at rest.
+/// Estimate of both triads and of attitudes, from gravity and the rates at rest.
 pub struct Turned {
     /// The triads, and the attitude at the first sample of each stretch.
     pub at: Linearisation,
@@ -124,7 +125,8 @@ pub struct Turned {
     pub equations: Equations,
 }
 
-/// Both triads and attitudes from gravity and Earth rate; first only the accelerometers, from the magnitude of gravity.
+/// Estimates both triads and attitudes from gravity and Earth rate. The accelerometers alone come first, from the
+/// magnitude of gravity.
 pub fn calibrated(problem: &Problem, dwells: &[Vec<AtRest>]) -> Result<Turned, CalibrationError> {
     let model = &problem.model;
     let prior = from_vector(model.form, &model.prior_mean);

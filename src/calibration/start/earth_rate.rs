@@ -12,17 +12,17 @@ use crate::calibration::{CalibrationError, Model, Source};
 use crate::earth::ROTATION_RATE;
 use crate::imu::{PerSensor, Sensor, Triad};
 
-/// Gyro bias, accurate to Earth rate: the mean output at rest. If the prior is so wrong that a move looks like a
-/// different one, no iteration can recover.
+/// The gyro bias, accurate to Earth rate, from the mean output at rest. If the prior were so wrong that one move was
+/// mistaken for another, the iterations could not recover.
 pub fn gyro_bias_at_rest(dwells: &[Vec<AtRest>]) -> Vector3<f64> {
     let dwells = || dwells.iter().flatten();
     let outputs: Vector3<f64> = dwells().map(|dwell| dwell.mean.gyro.output).sum();
     outputs / dwells().count() as f64
 }
 
-/// Fits Earth rate, whose Up component is known, and a constant along body axes: at rest `C ω = ω_ie + C b`. Different
-/// attitudes separate the two. Returns the headings of all stretches and b, rad/s, or an error if a rate is not a
-/// number.
+/// Fits Earth rate, whose Up component is known, and a constant b along the body axes; at rest, `C ω = ω_ie + C b`.
+/// Different attitudes separate the bias from Earth rate. Returns the headings of all stretches and b, rad/s, or an
+/// error if a rate is not a number.
 pub fn gyrocompass(
     model: &Model,
     stretches: &[Stretch],

@@ -1,7 +1,7 @@
-//! Elimination of errors that are common to several rows, at a cost proportional to the number of events.
+//! Elimination of errors that several rows have in common, at a cost proportional to the number of events.
 //!
 //! Common errors are unknowns with a prior: they enter with the first event that they affect, and leave after the last.
-//! One triangular factor of the parameters remains (square-root information filter; Bierman 1977,
+//! At the end, one triangular factor of the parameters remains (square-root information filter; Bierman 1977,
 //! *Factorization Methods for Discrete Sequential Estimation*, ch. V).
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -51,8 +51,8 @@ impl Eliminated {
         self.r.view((first, first), left).into_owned()
     }
 
-    /// Response of the unknowns, with this covariance, to each error of the table: their negative covariance with an
-    /// error that is also estimated.
+    /// Response of the unknowns, whose covariance is given, to each error of the table; it equals the negative
+    /// covariance of the unknowns with the estimated error.
     pub fn by_table(&self, covariance: &DMatrix<f64>) -> BTreeMap<usize, DMatrix<f64>> {
         let first = 3 * self.errors.len();
         let of_errors = self.r.view((0, 0), (first, first));

@@ -1,4 +1,4 @@
-//! Linear equations for the errors of both triads about one point.
+//! Linear equations for the errors of both triads, linearised at one point.
 //!
 //! A row consists of a residual, its partial derivatives with respect to the unknowns, and its error sources. The
 //! unknowns are the parameters of a form, or the entries of `A = K C` and `D` of each triad ([`of_sensitivity`]).
@@ -71,7 +71,7 @@ pub enum Common {
     Noise(Sensor, usize),
     /// Bias variation of a triad at the end of the event with this number.
     Drift(Sensor, usize),
-    /// A vector with unit covariance, by number.
+    /// A vector with unit covariance, identified by its number.
     Unit(usize),
     /// Number of a vector with unit covariance that both triads share: an error of the table.
     Table(usize),
@@ -116,7 +116,8 @@ pub struct Equations {
     pub sigma: DVector<f64>,
     pub rows: Vec<Rows<1>>,
     pub events: Vec<Event>,
-    /// Whether [`Self::solved`] weights rows by the inverse of their full covariance instead of their variances.
+    /// Whether [`Self::solved`] uses the inverse of the full covariance of the rows as weight, and not only their
+    /// variances.
     pub correlated: bool,
 }
 
@@ -177,13 +178,13 @@ impl Equations {
         )
     }
 
-    /// Does the same as [`Self::scaled`], with the unknowns in units of their prior σ.
+    /// Does the same as [`Self::scaled`], but with the unknowns in units of their prior σ.
     pub fn in_sigmas(&self) -> (DMatrix<f64>, DVector<f64>) {
         let (design, residual) = self.scaled();
         (design * DMatrix::from_diagonal(&self.sigma), residual)
     }
 
-    /// Expands a matrix of the unknowns to all parameters.
+    /// Expands a matrix for the unknowns to a matrix for all parameters.
     pub fn whole(&self, of_unknowns: &DMatrix<f64>) -> ParameterMatrix {
         let place = |k: usize| self.unknown.iter().position(|&index| index == k);
         ParameterMatrix::from_fn(|i, j| match (place(i), place(j)) {
@@ -250,7 +251,7 @@ impl Equations {
     }
 }
 
-/// The partial derivatives of one triad among those of both.
+/// Embeds the partial derivatives of one triad in those of both triads.
 pub fn of<const N: usize>(sensor: Sensor, partials: &OfTriad<N>) -> Partials<N> {
     let mut whole = Partials::zeros();
     let mut place = whole.fixed_columns_mut::<PER_TRIAD>(parameter(sensor, 0));
@@ -258,8 +259,8 @@ pub fn of<const N: usize>(sensor: Sensor, partials: &OfTriad<N>) -> Partials<N> 
     whole
 }
 
-/// Partial derivatives of `A u + D` with respect to `A` and `D`, row by row, for `[u; 1]`; with `[u; 0]`, those of an
-/// output without bias.
+/// Partial derivatives of `A u + D` with respect to `A` and `D`, row by row, for `[u; 1]`; for `[u; 0]`, the
+/// derivatives of an output without bias.
 pub fn of_sensitivity(input: Vector4<f64>) -> OfTriad<3> {
     Matrix3::identity().kronecker(&input.transpose())
 }
@@ -269,7 +270,7 @@ pub fn of_parameters(triad: &Triad, input: &Vector3<f64>) -> OfTriad<3> {
     OfTriad::from_columns(&triad.response().map(|response| response * input.push(1.0)))
 }
 
-/// Iterates from a first point, with one step from each point, until no parameter changes by more than this.
+/// Iterates from a first point, with one step from each point, until no parameter changes by more than this limit.
 pub fn gauss_newton(
     from: PerSensor<Triad>,
     smallest: &ParameterVector,

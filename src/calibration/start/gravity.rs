@@ -24,7 +24,7 @@ const BIAS: usize = PER_TRIAD - 3;
 /// A dwell with its mean outputs.
 #[derive(Debug, Clone)]
 pub struct AtRest {
-    /// Number among the dwells of all stretches.
+    /// Number of the dwell among the dwells of all stretches.
     pub number: usize,
     pub samples: Range<usize>,
     /// Start and end, s.
@@ -65,8 +65,8 @@ impl AtRest {
     }
 }
 
-/// Each dwell, with the preceding move. The noise of a move consists only of the bias variation, because the random
-/// walk of each row is independent.
+/// Each dwell with the move that precedes it. The noise of a move consists only of the bias variation, because the
+/// random walk of each row is independent.
 pub fn events(problem: &Problem, dwells: &[Vec<AtRest>]) -> Vec<Event> {
     let mut events = Vec::new();
     for (stretch, dwells) in problem.stretches().iter().zip(dwells) {
@@ -94,7 +94,7 @@ pub fn events(problem: &Problem, dwells: &[Vec<AtRest>]) -> Vec<Event> {
     events
 }
 
-/// Error of the computed input of a triad (estimated − true) per error of each of its parameters.
+/// Error of the computed input of a triad (estimated − true) for a unit error of each of its parameters.
 pub fn input_errors(triad: &Triad, correction: &Matrix3<f64>, input: &Vector3<f64>) -> OfTriad<3> {
     correction * of_parameters(triad, input)
 }
@@ -113,9 +113,9 @@ pub fn of_noise<const N: usize>(
 pub struct Force {
     /// Magnitude, m/s²; not zero.
     pub size: f64,
-    /// Up along body axes.
+    /// The upward direction, along body axes.
     pub up: Vector3<f64>,
-    /// Error of the force per error of each accelerometer parameter.
+    /// Error of the force for a unit error of each accelerometer parameter.
     pub error: OfTriad<3>,
 }
 
@@ -135,7 +135,7 @@ impl Force {
     }
 }
 
-/// Up along body axes in a dwell.
+/// The upward direction in a dwell, along body axes.
 pub fn up(triads: &PerSensor<Triad>, dwell: &AtRest) -> Result<Vector3<f64>, CalibrationError> {
     Ok(Force::of(triads, dwell)?.up)
 }
@@ -173,7 +173,7 @@ pub struct Heading {
     pub stretch: usize,
     /// Rotation about Up that aligns the attitudes with East-North-Up, rad.
     pub turn: Matrix3<f64>,
-    /// 1σ of the heading, rad; above one, the heading is unknown.
+    /// 1σ of the heading, rad; a value above one means that the heading is unknown.
     pub sigma: f64,
 }
 
@@ -194,7 +194,8 @@ impl Heading {
     }
 }
 
-/// Attitudes of the dwells of a stretch: the gyros carry each attitude to the next dwell, where it is levelled.
+/// Attitudes of the dwells of a stretch. The gyros propagate each attitude to the next dwell, where the accelerometers
+/// level it.
 pub struct Chain {
     pub attitudes: Vec<Matrix3<f64>>,
     moves: Vec<Move>,
@@ -221,7 +222,7 @@ struct Move {
 }
 
 impl Chain {
-    /// Starts from an attitude in the first dwell and levels it.
+    /// Starts from an attitude in the first dwell and levels this attitude.
     ///
     /// Source: Tedaldi, Pretto, Menegatti 2014, "A robust and easy to implement method for IMU calibration
     /// without external equipments", ICRA, §IV.
@@ -245,7 +246,8 @@ impl Chain {
         Ok(Self { attitudes, moves })
     }
 
-    /// Rotates the chain to its heading and adds the moves between the dwells: the gyros carry Up through each move.
+    /// Rotates the chain of attitudes to its heading and adds the moves between the dwells, through which the gyros
+    /// propagate the upward direction.
     pub fn add(
         &self,
         equations: &mut Equations,

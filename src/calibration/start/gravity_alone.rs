@@ -1,7 +1,7 @@
-//! An instrument without gyros, or whose gyros turn between no two dwells: what gravity at rest says of it.
+//! Estimate from gravity at rest alone, for an instrument that has no gyros or is not turned between any two dwells.
 //!
-//! The magnitude of gravity in the dwells, and labels of them if there are any, give the accelerometers; the rates at
-//! rest give the gyro biases. Everything else keeps its prior.
+//! The accelerometers follow from the magnitude of gravity in the dwells and from labels, if there are any; the gyro
+//! biases follow from the rates at rest. All other parameters keep their prior.
 
 use nalgebra::{DMatrix, Matrix3, SMatrix, Vector2, Vector3};
 
@@ -33,7 +33,7 @@ const SMALL: f64 = 1e-6;
 const FACES: Common = Common::Unit(0);
 
 impl Problem<'_> {
-    /// Whether gravity at rest is all that the runs show.
+    /// Whether the runs contain no information except gravity at rest.
     pub fn shows_gravity_alone(&self) -> bool {
         let turns = |of: &Segment| matches!(of.motion, Some(LabelledMotion::Turns { .. }));
         let labelled = |run: &Run| run.recording.segments.iter().any(turns);
@@ -69,13 +69,13 @@ pub struct Standing {
     pub findings: Vec<Finding>,
     /// The magnetometer, if there is one and the dwells determine it.
     pub magnetic: Option<MagneticEstimate>,
-    /// Number of dwells, and their time, s.
+    /// Number of dwells, and their total time, s.
     pub count: usize,
     pub time: f64,
 }
 
-/// Accelerometers and, where there are gyros, their biases. A prior that the dwells contradict is widened, so that it
-/// does not draw what they hardly show.
+/// Estimates the accelerometers and, if there are gyros, their biases. A prior that the dwells contradict is widened,
+/// so that it does not bias parameters that the dwells hardly show.
 pub fn standing(problem: &Problem) -> Result<Standing, CalibrationError> {
     let mut findings = Vec::new();
     let labels = problem.stretches().iter().map(|stretch| {

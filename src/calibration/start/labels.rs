@@ -1,6 +1,8 @@
-//! Equations from labels: the instrument is placed by hand with each axis up and down and turned about each axis.
+//! Equations from labels, for an instrument that is placed by hand with each axis up and down and is turned about each
+//! axis.
 //!
-//! North is unknown, but common to all sections with the same heading; turns rotate it along with the instrument.
+//! The direction of north is unknown but common to all sections with the same heading; turns change it along with the
+//! instrument.
 //!
 //! Source: Ferraris, Grimaldi, Parvis 1995, "Procedure for effortless in-field calibration of
 //! three-axial rate gyro and accelerometers", *Sensors and Materials* 7(5), without the gyros'
@@ -58,7 +60,7 @@ impl Section {
     }
 }
 
-/// The used sections, and the labels of the others.
+/// The sections that are used, and the labels of the other sections.
 #[derive(Default)]
 pub struct Used {
     pub sections: Vec<Section>,

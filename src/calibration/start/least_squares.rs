@@ -23,11 +23,11 @@ pub struct Solution {
 }
 
 impl Equations {
-    /// Least-squares δθ with the prior and rows weighted by their variances, increased by the Birge ratio: if noise is
-    /// understated, rows must not move parameters that they hardly show far from the prior.
+    /// Least-squares δθ with the prior; the weight of a row is the inverse of its variance times the Birge ratio. If
+    /// the noise is understated, rows must not move parameters that they hardly determine far from the prior.
     ///
     /// # Errors
-    /// [`CalibrationError::Singular`] with the triad of an unknown that is not a number.
+    /// Returns [`CalibrationError::Singular`] with the triad of an unknown that is not a number.
     pub fn step(&self) -> Result<ParameterVector, CalibrationError> {
         let Some(&first) = self.unknown.first() else {
             return Ok(ParameterVector::zeros());
@@ -93,7 +93,8 @@ impl Equations {
         })
     }
 
-    /// Covariance of δθ due to the errors of rows that are weighted by other variances; `None` as for [`Self::solved`].
+    /// Covariance of δθ due to the errors of rows whose weights follow from other variances; `None` as in
+    /// [`Self::solved`].
     pub fn by_errors(&self) -> Option<ParameterMatrix> {
         let (_, gain) = self.with_prior(&self.weighted_factor(), 1.0)?;
         Some(self.whole(&(&gain * self.scores() * &gain)))

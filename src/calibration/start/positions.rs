@@ -1,4 +1,4 @@
-//! One triad from its mean outputs under known inputs, by generalised least squares.
+//! Estimation of one triad from its mean outputs for known inputs, by generalised least squares.
 
 use std::collections::BTreeMap;
 
@@ -24,7 +24,7 @@ const SMALL: f64 = 1e-6;
 /// σ of an output without stated noise, divided by the largest input.
 const NOISELESS: f64 = 1e-9;
 
-/// The mean output of a triad under a known input, at a position or over a turn.
+/// The mean output of a triad for a known input, at a position or over a turn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Position {
     /// Mean input along body axes, rad/s or m/s².
@@ -33,7 +33,8 @@ pub struct Position {
     pub output: Vector3<f64>,
     /// Variance of each output axis, (rad/s)² or (m/s²)².
     pub variance: Vector3<f64>,
-    /// Variance for the weight of the position: `variance`, unless this would give too much weight.
+    /// Variance from which the weight of the position is computed: `variance`, or a larger value if this one would give
+    /// too much weight.
     pub weighted: Vector3<f64>,
 }
 
@@ -43,7 +44,7 @@ pub struct Known {
     pub position: Position,
     /// Start and end, s.
     pub times: [f64; 2],
-    /// Response of the input to unit-covariance errors.
+    /// Response of the input to errors with unit covariance.
     pub errors: Vec<(Common, Matrix3<f64>)>,
 }
 
@@ -144,7 +145,8 @@ impl Observed {
             .ok_or(CalibrationError::Singular { sensor })
     }
 
-    /// One triad from positions, with the prior if the positions do not determine every parameter better.
+    /// Estimates one triad from positions; if the positions do not determine every parameter to better than its prior
+    /// σ, also uses the prior.
     pub fn fitted(&self, model: &Model) -> Result<Fit, CalibrationError> {
         let first = parameter(self.sensor, 0);
         let sigma = model.prior_sigma.fixed_rows::<PER_TRIAD>(first);
@@ -165,8 +167,9 @@ impl Observed {
         Ok(self.fit(*triads.get(self.sensor), solution, &identity))
     }
 
-    /// One triad from positions alone: least squares for `A = K C` and `D` row by row, then the split of the form.
-    /// `None` for fewer than four positions, or for positions that leave a row undetermined.
+    /// Estimates one triad from positions alone, by least squares for `A = K C` and `D` row by row; the misalignment
+    /// form then splits A. Returns `None` if there are fewer than four positions, or if the positions leave a row
+    /// undetermined.
     pub fn determined(&self, form: InstallationForm) -> Option<Fit> {
         let mut rows = TriadVector::from_column_slice(Matrix4x3::identity().as_slice());
         let mut equations = self.of_sensitivity(sensitivity_and_bias(&rows));
@@ -235,9 +238,9 @@ fn in_a_plane(equations: &Equations) -> bool {
     norms.contains(&0.0) || correlations.symmetric_eigenvalues().min() < SMALLEST_EIGENVALUE
 }
 
-/// One triad from positions without common errors: least squares for `A = K C` and `D` row by row, then the split of
-/// the form. Returns the triad and the covariance of its parameters; `None` for fewer than four positions, or for
-/// positions that leave a row undetermined.
+/// Estimates one triad from positions without common errors, by least squares for `A = K C` and `D` row by row; the
+/// misalignment form then splits A. Returns the triad and the covariance of its parameters; Returns `None` if there are
+/// fewer than four positions, or if the positions leave a row undetermined.
 pub fn six_position_triad(
     positions: &[Position],
     form: InstallationForm,

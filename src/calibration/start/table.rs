@@ -28,8 +28,8 @@ pub fn sensed(site: &Site, sensor: Sensor) -> Vector3<f64> {
 /// Mean outputs in some dwells of the first run of the problem, with inputs from the table attitudes; `None` without a
 /// table.
 ///
-/// An attitude error `C_true = (I + [e×]) C_read` causes an input error of `C_readᵀ [u_n×] e`, from errors of base,
-/// axes, position and readings.
+/// An attitude error `C_true = (I + [e×]) C_read` causes an input error of `C_readᵀ [u_n×] e`, where e consists of the
+/// errors of base, axes, position and readings.
 pub fn positions(problem: &Problem, dwells: &[Dwell], sensor: Sensor) -> Option<Observed> {
     let (run, model) = (problem.run(), &problem.model);
     let axes = &model.geometry.axes;
@@ -73,8 +73,8 @@ pub fn positions(problem: &Problem, dwells: &[Dwell], sensor: Sensor) -> Option<
     })
 }
 
-/// Equations of both triads: in each dwell, velocity must stay zero and attitude constant; over each move between two
-/// dwells, the gyros must measure the rotation of the table.
+/// Equations of both triads. In each dwell, the velocity must stay zero and the attitude must stay constant; over each
+/// move between two dwells, the gyros must measure the rotation of the table.
 pub fn carried(
     problem: &Problem,
     triads: &PerSensor<Triad>,

@@ -8,9 +8,9 @@ use super::entry::{TermEntry, set_rows};
 pub const ENTRY: TermEntry = TermEntry {
     name: "accel-cross-coupling",
     title: "accel cross coupling",
-    help: "Accelerometers: products of specific force along two axes",
-    adds: "adds q times the product of these two components of f to f, along its axis",
-    shown_by: "dwells on edges, two axes 45° up",
+    help: "Accelerometers: products of the specific forces along two axes",
+    adds: "q times the product of these two components of f is added to f along its axis",
+    shown_by: "dwells with two axes 45° up",
     // Accelerometer, then the components that are multiplied.
     parameters: (
         "accel.cross_coupling",

@@ -29,13 +29,13 @@ pub struct TermEntry {
     pub title: &'static str,
     /// Description in the help of commands.
     pub help: &'static str,
-    /// Formula of the term: its addition to specific force f or angular rate w for a parameter q.
+    /// Formula of the term: the quantity that a parameter q adds to specific force f or angular rate w.
     pub adds: &'static str,
     /// Moves or dwells that show the term, if a path does not.
     pub shown_by: &'static str,
     /// The triad whose input the term changes.
     pub sensor: Sensor,
-    /// Unit of the parameters in files and reports: symbol, and value in SI.
+    /// Unit of the parameters in files and reports: its symbol, and its value in SI units.
     pub unit: (&'static str, f64),
     /// SI unit of the parameters.
     pub si_unit: &'static str,
@@ -44,18 +44,18 @@ pub struct TermEntry {
     /// Default 1σ of each parameter, in `unit`: ten
     /// times the value of precise instruments.
     pub usual_sigma: f64,
-    /// Largest possible parameter, in SI: its effect equals gravity, or a rate of [`REFERENCE_RATE`] (larger than in
-    /// any real instrument).
+    /// Largest possible parameter, in SI units. The effect of this parameter equals gravity, or a rate of
+    /// [`REFERENCE_RATE`] (larger than in any real instrument).
     pub largest: f64,
-    /// Names of its parameters in files: common prefix and suffixes.
+    /// Names of the term's parameters in files: the common prefix and the suffixes.
     pub parameters: (&'static str, &'static [&'static str]),
-    /// `∂t/∂q`, where t(q) is added to the input of its triad, rad/s or m/s²: a column for each parameter.
+    /// `∂t/∂q` with a column for each parameter, where t(q) is added to the input of the triad, rad/s or m/s².
     pub response: fn(&Sensed, &[f64], &mut Columns),
-    /// `t(q)` itself, if it is not linear in its parameters.
+    /// `t(q)` itself, if t is not linear in the parameters.
     pub added: Option<Added>,
 }
 
-/// Addition of a term to the input of its triad at these parameters, rad/s or m/s².
+/// The quantity that a term with these parameters adds to the input of its triad, rad/s or m/s².
 pub type Added = fn(&Sensed, &[f64]) -> Vector3<f64>;
 
 /// The columns of a term in a [`super::TermResponse`].
@@ -69,5 +69,5 @@ pub fn set_rows(columns: &mut Columns, row: impl Fn(usize) -> RowVector3<f64>) {
     }
 }
 
-/// Name suffixes for one parameter per axis.
+/// Suffixes of names, for terms with one parameter per axis.
 pub const PER_AXIS: [&str; 3] = [".x", ".y", ".z"];

@@ -1,8 +1,8 @@
 //! Gyro bias proportional to the square of specific force along its axis, for example from a suspension or resonator
 //! that yields under load.
 //!
-//! Source: IEEE Std 528-2019, acceleration-squared-sensitive drift rate (second power of one component).
-//! Products of two components are not included. Neither is |f|², which is the same in every dwell on Earth and
+//! Source: IEEE Std 528-2019, acceleration-squared-sensitive drift rate (second power of one component). Products of
+//! two components are not included. |f|² is not included either, because it is the same in every dwell on Earth and is
 //! therefore part of the bias.
 
 use super::entry::{PER_AXIS, REFERENCE_RATE, TermEntry};

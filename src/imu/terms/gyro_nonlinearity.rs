@@ -1,5 +1,5 @@
-//! Dependence of a gyro's scale factor on the magnitude of its rate: odd in the rate, of second and
-//! third order.
+//! Dependence of a gyro's scale factor on the magnitude of the rate, by terms of second and third order that are odd in
+//! the rate.
 
 use super::entry::{Columns, REFERENCE_RATE, Sensed, TermEntry};
 use super::gyro_second_order;
@@ -7,7 +7,7 @@ use super::gyro_second_order;
 pub const ENTRY: TermEntry = TermEntry {
     name: "gyro-nonlinearity",
     title: "gyro nonlinearity",
-    help: "Gyros: scale factor that changes with the magnitude of angular rate",
+    help: "Gyros: scale factor that changes with the magnitude of the angular rate",
     adds: "q |w| w / r (odd quadratic), q w^3 / r^2 (third order) along its axis to w, r = 100 deg/s",
     shown_by: "turns about each axis at three rates",
     parameters: (

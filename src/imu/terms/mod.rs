@@ -1,7 +1,7 @@
-//! Error terms of an instrument, in addition to `K`, `E` and `D`: each adds `t(q)` to the input of a triad, `N = K C (u
-//! + t(q)) + D`, with its own parameters `q`.
+//! Error terms of an instrument, in addition to `K`, `E` and `D`. Each term adds `t(q)` to the input of a triad, `N = K
+//! C (u + t(q)) + D`, with its own parameters `q`.
 //!
-//! A term is a [`TermEntry`] in a separate file and a line of the registry below. Options, files, simulation,
+//! A term consists of a [`TermEntry`] in a separate file and a line in the registry below. Options, files, simulation,
 //! estimation, budget, report and exports read the entry.
 //!
 //! Source: IEEE Std 1293-2018, §5.3 (accelerometers: second and third order, cross coupling,
@@ -123,8 +123,9 @@ impl Term {
         entry.usual_sigma * entry.unit.1
     }
 
-    /// Usual size of each parameter in an instrument with this noise, in SI: the size in precise instruments times the
-    /// ratio of the white noise of the triad to theirs; lever arms and delays do not depend on the class.
+    /// Usual size of each parameter in an instrument with this noise, in SI units. This is the size in precise
+    /// instruments times the ratio of the white noise of the triad to that of precise instruments. Lever arms and
+    /// delays do not depend on the class of instrument.
     pub fn usual_size(self, noise: &PerSensor<Noise>) -> f64 {
         let precise = 0.1 * self.usual_sigma();
         if matches!(self, Self::SizeEffect | Self::TimeOffset) {
@@ -134,12 +135,12 @@ impl Term {
         precise * (noise.get(sensor).random_walk / PRECISE.get(sensor)).max(1.0)
     }
 
-    /// Indices of its parameters.
+    /// Indices of the parameters of the term.
     pub const fn parameters(self) -> std::ops::Range<usize> {
         FIRST[self as usize]..FIRST[self as usize + 1]
     }
 
-    /// The term of a parameter.
+    /// The term to which a parameter belongs.
     pub fn of(parameter: usize) -> Option<Self> {
         let has = |term: &Self| term.parameters().contains(&parameter);
         Self::ALL.into_iter().find(has)
@@ -160,7 +161,7 @@ impl Term {
 }
 
 impl Sensed {
-    /// `t(q)`: addition of the terms with these parameters to the input of a triad, rad/s or m/s².
+    /// `t(q)`, which the terms with these parameters add to the input of a triad, rad/s or m/s².
     pub fn added(&self, sensor: Sensor, q: &TermVector) -> Vector3<f64> {
         let mut linear = self.response(sensor, q);
         let mut others = Vector3::zeros();

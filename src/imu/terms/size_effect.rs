@@ -1,5 +1,5 @@
-//! Size effect: accelerometers x and y are displaced from z by lever arms r_x and r_y and therefore also sense row i of
-//! `([ω̇×] + [ω×]²) r_i`. A lever arm common to all three accelerometers is not observable from dwells.
+//! Size effect: accelerometers x and y are displaced from accelerometer z by lever arms r_x and r_y and therefore also
+//! sense row i of `([ω̇×] + [ω×]²) r_i`. A lever arm common to all three accelerometers is not observable from dwells.
 
 use super::entry::{Columns, REFERENCE_RATE, Sensed, TermEntry, set_rows};
 use crate::imu::Sensor;

@@ -1,5 +1,5 @@
-//! Accelerometer samples refer to a time q later than gyro samples, in s: if the body stays in place and rotates by θ
-//! in that time, the samples are `exp(−[θ×]) f`, or `f − q (ω − ω_ie) × f` to first order.
+//! Accelerometer samples refer to a time that is q seconds later than that of the gyro samples. If the body stays in
+//! place and rotates by θ during q, the samples are `exp(−[θ×]) f`, or `f − q (ω − ω_ie) × f` to first order.
 
 use nalgebra::Vector3;
 
@@ -10,9 +10,9 @@ use crate::imu::Sensor;
 pub const ENTRY: TermEntry = TermEntry {
     name: "time-offset",
     title: "accel time offset",
-    help: "Accelerometers: delay of their samples relative to the gyros",
+    help: "Accelerometers: delay of the accelerometer samples relative to the gyro samples",
     adds: "-q w x f to f, accelerometers sampled later",
-    shown_by: "fast turns about level axes",
+    shown_by: "fast turns about horizontal axes",
     sensor: Sensor::Accel,
     unit: ("ms", 1e-3),
     si_unit: "s",

@@ -1,4 +1,4 @@
-//! A segment placed in time, with its motion.
+//! A segment at its place in time, with its motion.
 
 use nalgebra::{Vector2, Vector3};
 
@@ -11,7 +11,7 @@ use crate::units::STANDARD_GRAVITY;
 const SPEED: usize = 0;
 const HEIGHT: usize = 2;
 
-/// A segment placed in time; speed, heading and height, in this order.
+/// A segment at its place in time; quantities are speed, heading and height, in this order.
 #[derive(Debug, Clone, Copy)]
 pub struct Leg {
     start: f64,
@@ -80,7 +80,7 @@ impl Leg {
         self.changes[HEIGHT].peak_rate()
     }
 
-    /// The next time after this one at which a third derivative jumps, at the latest the end.
+    /// The time of the next jump of a third derivative; if there is none, the end of the leg.
     pub fn next_break(&self, after: f64) -> f64 {
         self.changes
             .iter()
@@ -114,7 +114,7 @@ impl Kinematics {
         [pitch, roll]
     }
 
-    /// Whether only position changes.
+    /// Whether only the position changes.
     pub fn is_steady(&self) -> bool {
         let Self([speed, heading, height]) = self;
         let changes = [

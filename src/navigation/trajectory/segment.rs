@@ -17,23 +17,23 @@ pub struct Start {
     pub speed: f64,
 }
 
-/// Changes that start together. The segment ends with the last of them.
+/// A segment; all its changes start together. The segment ends when the last change ends.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Segment {
     /// Minimum duration, s.
     pub duration: f64,
     /// Turn by this angle, rad, clockwise positive.
     pub turn: Change,
-    /// Change to this horizontal speed, m/s; `None` keeps it.
+    /// Change to this horizontal speed, m/s; `None` keeps the speed.
     pub speed: Option<Change>,
-    /// Change to this height above the ellipsoid, m; `None` keeps it.
+    /// Change to this height above the ellipsoid, m; `None` keeps the height.
     pub height: Option<Change>,
 }
 
 /// A change of a quantity, with its limits.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Change {
-    /// The change, or the new value.
+    /// The amount of the change, or the new value.
     pub amount: f64,
     /// Maximum rate of the change, per s.
     pub rate: f64,

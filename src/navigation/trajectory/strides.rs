@@ -1,4 +1,4 @@
-//! Motion along a trajectory in steps as long as smoothness permits.
+//! Motion along a trajectory, in steps as long as the smoothness of the motion permits.
 
 use std::convert::Infallible;
 
@@ -37,7 +37,7 @@ impl Stride {
     }
 }
 
-/// Motion along a trajectory in steps that end at its breaks and resolve the motion between them.
+/// Motion along a trajectory, in steps that end at its discontinuities and resolve the motion between them.
 #[derive(Debug, Clone)]
 pub struct Strides<'a> {
     trajectory: &'a Trajectory,
@@ -82,8 +82,8 @@ impl Strides<'_> {
         self.leg.at(time).instant(place, self.trajectory.banks)
     }
 
-    /// Continues until the given time, in s since the start, and passes every stride to the caller. The computed
-    /// solution rotates at `beside` rad/s relative to the body.
+    /// Continues until the given time, in s since the start, and passes each step to the caller. The computed solution
+    /// rotates relative to the body at `beside` rad/s.
     ///
     /// # Errors
     /// The first error returned for a stride.

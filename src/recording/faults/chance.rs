@@ -1,4 +1,4 @@
-//! Significance limits for faults: required improbability of samples in a faultless recording.
+//! Significance limits for faults, that is, how improbable samples must be in a recording without faults.
 
 use statrs::distribution::{ContinuousCDF, Normal};
 
@@ -8,7 +8,7 @@ const RECORDS: f64 = 1e4;
 /// The limit of one kind of fault in a recording, with Bonferroni's correction over all samples of its six axes.
 #[derive(Debug, Clone, Copy)]
 pub struct Limit {
-    /// −ln of the probability that a faultless sample exceeds the limit.
+    /// −ln of the probability that a sample without a fault exceeds the limit.
     pub nats: f64,
     /// The equivalent two-sided limit in σ of a normal distribution.
     pub sigmas: f64,
@@ -31,12 +31,12 @@ impl Limit {
         (freedom * exponent.exp_m1()).sqrt()
     }
 
-    /// The quantile exceeded by one in a thousand of these values, and the limit of a statistic with the same tail as
+    /// The quantile that one in a thousand of these values exceeds, and the limit of a statistic with the same tail as
     /// these values, in σ of the normal distribution.
     ///
-    /// Two quantiles of the values are extrapolated to the limit by a power of the normal quantiles, so that the tail
-    /// may be heavier than normal, never lighter. A few faults among the values do not affect these quantiles. `values`
-    /// are reordered.
+    /// The limit is extrapolated from two quantiles of the values, with a power of the normal quantiles; the tail may
+    /// therefore be heavier than normal, but never lighter. A few faults among the values do not affect these
+    /// quantiles. `values` are reordered.
     pub fn of_tail(&self, values: &mut [f64]) -> (f64, f64) {
         let rows = values.len();
         let [inner, outer] = TAIL.map(|part| {

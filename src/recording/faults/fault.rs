@@ -11,12 +11,12 @@ pub struct Fault {
     pub kind: FaultKind,
     /// Triad and body axis (right, front, up); `None` if whole rows are affected.
     pub axis: Option<(Sensor, usize)>,
-    /// The samples; for a duplicate, the sample that is repeated in the file.
+    /// The faulty samples; for a duplicate, the sample that is repeated in the file.
     pub samples: Range<usize>,
-    /// Line in the file: of the first sample, of the second of two equal rows, or of the last row
-    /// before missing ones.
+    /// Line in the file: the line of the first sample, of the second of two equal rows, or of the last row before
+    /// missing rows.
     pub line: u64,
-    /// Whether the samples are repaired: interpolated with the error in a [`Bridge`], or dropped.
+    /// Whether the samples are repaired, that is, interpolated with the error given in a [`Bridge`], or dropped.
     pub bridged: bool,
 }
 
@@ -27,13 +27,13 @@ pub enum FaultKind {
     Missing,
     /// A copy of the previous row, including its time stamp.
     Duplicate,
-    /// Values at the end of the axis' range; the true value may lie beyond.
+    /// Values at the end of the range of the axis; the true value may be beyond this end.
     Saturated,
     /// A repeated value, although the axis' noise or motion continues.
     Stuck,
     /// A single sample that fits neither the previous nor the following samples.
     Spike,
-    /// A row of zeros, although gravity is not zero.
+    /// A row of zeros, which is impossible under gravity.
     Zero,
     /// Values beyond the range of any instrument.
     Beyond,
@@ -70,15 +70,15 @@ impl FaultKind {
 pub struct Bridge {
     /// The samples.
     pub samples: Range<usize>,
-    /// Variance that interpolation adds to the integral of the normalised output over all of them, along each
-    /// body axis right, front, up, rad² or (m/s)².
+    /// Variance that interpolation adds to the integral of the normalised output over all of them, along the body axes
+    /// right, front and up, rad² or (m/s)².
     pub variance: PerSensor<[f64; 3]>,
     /// Which axes were interpolated.
     pub axes: PerSensor<[bool; 3]>,
 }
 
 impl Bridge {
-    /// A bridge over these samples, without axes so far.
+    /// A bridge over these samples, to which axes are added later.
     pub fn new(samples: Range<usize>) -> Self {
         Self {
             samples,

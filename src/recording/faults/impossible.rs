@@ -1,5 +1,5 @@
-//! Values impossible for an instrument at rest or on a turntable, for example from a failed transfer or a counter
-//! underflow.
+//! Detection of values that are impossible for an instrument at rest or on a turntable, for example after a failed
+//! transfer or a counter underflow.
 
 use std::ops::Range;
 
@@ -13,8 +13,8 @@ const FASTEST: f64 = 1000.0;
 const LARGEST_FORCE: f64 = 1e4;
 
 /// Rows that exceed the range of any instrument at nominal scales, and rows that are zero in all columns although
-/// gravity exceeds the smallest step, in row order. If most rows are impossible, none of that kind are returned,
-/// because then a unit is wrong.
+/// gravity exceeds the smallest step, in row order. If most rows are impossible, no rows of this kind are returned,
+/// because the cause is then a wrong unit.
 pub fn impossible(rows: &Rows) -> Vec<FaultyRows> {
     let count = rows.columns[0].len();
     let found = |kind, column, is: &dyn Fn(usize) -> bool| {

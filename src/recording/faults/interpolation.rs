@@ -1,4 +1,4 @@
-//! Interpolation of holes in an axis from both sides, with an error measured on intact stretches.
+//! Interpolation of missing samples on an axis from both sides, with an error measured on intact stretches.
 
 mod fill;
 
@@ -43,8 +43,8 @@ pub struct Hole<'a> {
 }
 
 impl<'a> Hole<'a> {
-    /// A hole of these samples; `sound` flags the usable samples of the record. No error is stated for a hole longer
-    /// than `longest`.
+    /// A hole that consists of these samples; `sound` marks the usable samples of the record. No error is stated for a
+    /// hole longer than `longest`.
     pub fn new(sound: &'a [bool], samples: Range<usize>, longest: usize) -> Self {
         let sides = [
             neighbours(sound, (0..samples.start).rev(), samples.len()),
@@ -70,10 +70,10 @@ impl<'a> Hole<'a> {
 
     /// Fills the hole on an axis. Returns the mean square error of the sum over the hole; `None` if it is unknown.
     ///
-    /// `rounding` is the mean square of this error that rounding to whole steps can cause. If errors are that small,
-    /// selecting the best fill depends on the individual steps next to the hole: among pulses that are mostly zero, a
-    /// fill without any pulse seems free of error, but is biased by whole pulses. The widest fill is then used
-    /// regardless of the values: it is linear in them, and therefore unbiased.
+    /// `rounding` is the mean square of this error that rounding to whole steps can cause. If the errors are as small
+    /// as this, the choice of the best fill depends on the individual steps next to the hole. Among pulses that are
+    /// mostly zero, for example, a fill without any pulse seems free of error, but is biased by whole pulses. In this
+    /// case, the widest fill is used for any values, because it is linear in the values and therefore unbiased.
     pub fn fill(&self, axis: &mut [f64], rounding: f64) -> Option<f64> {
         let best = self.within(axis, rounding).or_else(|| self.best(axis));
         if let Some(best) = best {

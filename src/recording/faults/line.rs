@@ -1,4 +1,4 @@
-//! The line through equidistant values.
+//! The straight line through equidistant values.
 
 /// Mean of values, and slope of the line through them.
 pub fn mean_and_slope(values: &[f64]) -> (f64, f64) {

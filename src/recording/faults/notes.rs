@@ -21,10 +21,11 @@ pub fn notes(imu: &ImuSamples) -> Vec<String> {
         let done = if kind == FaultKind::Duplicate {
             "turncal dropped the duplicates.".to_owned()
         } else if unbridged == 0 {
-            "turncal interpolated there, and the σ include the interpolation error.".to_owned()
+            "turncal interpolated these samples, and the σ include the interpolation error."
+                .to_owned()
         } else {
             format!(
-                "{unbridged} of {} places are too long to bridge, so attitude and velocity restart there.",
+                "{unbridged} of {} faults are too long to bridge, so attitude and velocity restart after them.",
                 faults.len()
             )
         };
@@ -33,7 +34,9 @@ pub fn notes(imu: &ImuSamples) -> Vec<String> {
         } else {
             "in"
         };
-        let time = imu.time(first.samples.start);
+        let centiseconds = (100.0 * imu.time(first.samples.start)).round();
+        // Without the sign of a rounded negative time.
+        let time = centiseconds / 100.0 + 0.0;
         Some(format!(
             "{what} (first {place} line {}, {time:.2} s): {done}",
             first.line
@@ -51,17 +54,18 @@ impl ImuSamples {
         let [from, to] = [part.samples.start, part.samples.end].map(|k| self.time(k));
         let [usual, step] = [1, part.step].map(|samples| 1e3 * self.period * samples as f64);
         let done = match part.places - part.bridged {
-            0 => "turncal interpolated the samples in between, and the σ include the interpolation error."
+            0 => "turncal interpolated the missing samples, and the σ include the interpolation error."
                 .to_owned(),
             unbridged => format!(
-                "turncal interpolated the samples in between, but attitude and velocity restart at {unbridged} of {} \
+                "turncal interpolated the missing samples, but attitude and velocity restart in {unbridged} of {} \
                  places, so dwells and moves are lost. Split the log where its rate changes, and calibrate the parts \
                  together as a campaign.",
                 part.places
             ),
         };
         format!(
-            "From line {} ({from:.2} s) to {to:.2} s the row interval is {step:.3} ms instead of {usual:.3} ms: {done}",
+            "From line {} ({from:.2} s) to {to:.2} s, the interval between rows is {step:.3} ms instead of {usual:.3} \
+             ms: {done}",
             part.line
         )
     }
@@ -80,7 +84,7 @@ impl ImuSamples {
             FaultKind::Spike if count == 1 => "a spike",
             FaultKind::Spike => "spikes",
             FaultKind::Zero => {
-                "zero in all columns, which is impossible for accelerometers under gravity"
+                "zero in all columns, which is impossible for accelerometers in a gravity field"
             }
             FaultKind::Beyond => "beyond the range of any instrument at the nominal scale",
             FaultKind::Missing | FaultKind::Saturated | FaultKind::Stuck => kind.name(),

@@ -1,8 +1,9 @@
-//! Axes pinned to a value while the instrument is working: stuck within their range, or clipped at its end.
+//! Detection of axes that stay at one value while the instrument is working: stuck within their range, or clipped at
+//! its end.
 //!
-//! A working axis repeats a value as long as its noise and motion remain within one step of its grid. A run of equal
-//! values is a fault if it is improbable. This is tested against the noise of the axis at rest, the level on either
-//! side, the motion that crosses the run and, at an end of the range, the motion on either side.
+//! A working axis repeats a value only as long as its noise and motion remain within one step of its grid. A run of
+//! equal values is a fault if it is improbable. The test compares the run with the noise of the axis at rest, the level
+//! on either side, the motion that crosses the run and, at an end of the range, the motion on either side.
 
 mod ends;
 
@@ -32,7 +33,7 @@ const CLOSE: usize = 16;
 /// Median magnitude of second differences of white noise over its σ: √6 times that of a normal variate.
 const OF_SECOND_DIFFERENCES: f64 = 2.449_489_742_783_178 * 0.674_489_750_196_081_7;
 
-/// A column with the statistics for its tests.
+/// A column with the statistics that its tests need.
 pub struct Axis<'a> {
     values: &'a [f64],
     facts: &'a ColumnFacts,
@@ -77,7 +78,8 @@ impl<'a> Axis<'a> {
         }
     }
 
-    /// Rows that repeat the previous row for longer than a working axis does, without the first of the equal values.
+    /// Rows that repeat the previous value for longer than a working axis does; the first of the equal values is not
+    /// included.
     pub fn stuck(&self, limit: Limit) -> Vec<Range<usize>> {
         if self.step <= 0.0 {
             return Vec::new();

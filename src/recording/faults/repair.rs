@@ -1,4 +1,4 @@
-//! From the rows of a file to the samples of a uniform clock.
+//! Conversion of the rows of a file to the samples of a uniform clock.
 
 use std::ops::Range;
 
@@ -21,7 +21,7 @@ const WORST_ANGLE: f64 = 0.2 * DEGREE;
 
 /// The complete samples, with faults and bridges.
 pub struct Repaired {
-    /// Columns as in [`Rows`], with a value for each sample.
+    /// The columns of [`Rows`], with a value for each sample.
     pub columns: [Vec<f64>; 6],
     /// Faults found.
     pub faults: Vec<Fault>,
@@ -45,7 +45,7 @@ impl Repaired {
 }
 
 impl Rows<'_> {
-    /// Finds faults and bridges them.
+    /// Finds and bridges faults.
     pub fn repair(mut self) -> Repaired {
         let mut faults = self.faults(&self.found());
         let mut columns = std::mem::take(&mut self.columns).map(|rows| placed(rows, &self.numbers));

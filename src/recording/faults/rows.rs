@@ -6,8 +6,7 @@ use super::fault::FaultKind;
 use crate::imu::Sensor;
 use crate::recording::ColumnFacts;
 
-/// The rows of a file without duplicates. Columns are gyro x, y, z and accelerometer x, y, z of the
-/// file.
+/// The rows of a file without duplicates. The columns are gyro x, y, z and accelerometer x, y, z of the file.
 pub struct Rows<'a> {
     /// Gyro x, y, z and accelerometer x, y, z.
     pub columns: [Vec<f64>; 6],
@@ -21,9 +20,9 @@ pub struct Rows<'a> {
     pub body_axes: [usize; 6],
     /// One unit of the file's quantity in rad or m/s.
     pub units: [f64; 6],
-    /// Line of each row.
+    /// Line number of each row.
     pub lines: Vec<u64>,
-    /// Sample of each row, increasing from zero.
+    /// Sample number of each row, increasing from zero.
     pub numbers: Vec<usize>,
     /// Sample period, s.
     pub period: f64,
@@ -36,7 +35,7 @@ pub fn sensor(column: usize) -> Sensor {
     Sensor::ALL[column / 3]
 }
 
-/// Faulty rows of one column, or whole rows.
+/// Faulty rows in one column, or faulty whole rows.
 pub struct FaultyRows {
     pub kind: FaultKind,
     pub column: Option<usize>,
@@ -55,7 +54,7 @@ pub fn ranges(count: usize, is: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
     consecutive((0..count).filter(|&row| is(row)))
 }
 
-/// Increasing numbers as runs of consecutive ones.
+/// Groups increasing numbers into runs of consecutive numbers.
 pub fn consecutive(rows: impl Iterator<Item = usize>) -> Vec<Range<usize>> {
     let mut ranges: Vec<Range<usize>> = Vec::new();
     for row in rows {

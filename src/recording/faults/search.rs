@@ -1,4 +1,4 @@
-//! Faulty rows that the other rows reveal.
+//! Searches for faulty rows by comparing them with the other rows.
 
 use std::ops::Range;
 

@@ -1,4 +1,4 @@
-//! Parts of a recording with a lower row rate: the same number of rows is missing at each place.
+//! Detection of parts of a recording with a lower row rate, in which the same number of rows is missing at each place.
 
 use std::f64::consts::LN_2;
 use std::ops::Range;
@@ -10,32 +10,32 @@ use crate::recording::ImuSamples;
 /// A part of a recording with a lower row rate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Slower {
-    /// The samples from the first one without a row to the last.
+    /// The samples from the first sample without a row to the last sample without a row.
     pub samples: Range<usize>,
     /// Line of the row before these samples.
     pub line: u64,
     /// Number of samples from one row to the next.
     pub step: usize,
-    /// Number of places between rows.
+    /// Number of places with missing samples between rows.
     pub places: usize,
     /// Number of these places that are bridged.
     pub bridged: usize,
 }
 
 impl Slower {
-    /// Whether this fault is one of the places of this part.
+    /// Whether this fault is one of the places in this part.
     pub fn holds(&self, fault: &Fault) -> bool {
         fault.kind == FaultKind::Missing && self.samples.contains(&fault.samples.start)
     }
 
-    /// The samples that have no row.
+    /// Number of samples that have no row.
     pub fn missing(&self) -> usize {
         self.places * (self.step - 1)
     }
 }
 
 impl ImuSamples {
-    /// Parts in which holes of one length alternate with single rows, for longer than chance allows even if every other
+    /// Parts in which gaps of one length alternate with single rows for longer than chance allows, even if every other
     /// row is missing at random.
     pub fn slower(&self) -> Vec<Slower> {
         let of_kind = |fault: &&Fault| fault.kind == FaultKind::Missing;
@@ -91,8 +91,8 @@ mod tests {
         let said = notes(&imu);
         assert!(
             said[0].starts_with(
-                "From line 2001 (20.01 s) to 39.98 s the row interval is 30.000 ms instead of 10.000 ms: turncal \
-                 interpolated the samples in between, but attitude and velocity restart at 499 of 666 places"
+                "From line 2001 (20.01 s) to 39.98 s, the interval between rows is 30.000 ms instead of 10.000 ms: \
+                 turncal interpolated the missing samples, but attitude and velocity restart in 499 of 666 places"
             ),
             "{said:?}"
         );

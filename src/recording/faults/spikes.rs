@@ -1,4 +1,4 @@
-//! Spikes: single samples that match neither side.
+//! Detection of spikes, which are single samples that match neither the preceding nor the following samples.
 
 use rayon::prelude::*;
 
@@ -17,13 +17,14 @@ const FEWEST: usize = TRIALS / 4;
 /// Number of samples examined on one side.
 const SIDE: usize = TRIALS + LINES[LINES.len() - 1];
 
-/// For each column, the rows that deviate from lines on both sides by more than in a faultless recording. `steps` are
-/// the smallest differences of values in the columns.
+/// For each column, the rows that deviate from the lines on both sides by more than rows of a faultless recording do.
+/// `steps` are the smallest differences of values in the columns.
 ///
-/// A sample belongs to the motion if the line from before or from after fits it, or if the sample lies between the two
-/// lines: then a turn started or ended there. The error of a line is measured on the surrounding samples, and therefore
-/// includes noise, resolution and motion. The limit follows the tail of the second differences of the whole column. A
-/// knock is also motion: it lasts longer than one sample, or appears on other axes.
+/// A sample is part of the motion if the line from before or the line from after fits the sample, or if the sample lies
+/// between the two lines, because then a turn started or ended at the sample. The error of a line is measured on the
+/// surrounding samples, and therefore includes noise, resolution and motion. The limit follows the tail of the second
+/// differences of the whole column. A knock is also motion, because it lasts longer than one sample or appears on other
+/// axes too.
 pub fn spikes(columns: &[&[f64]; 6], steps: &[f64], limit: Limit) -> [Vec<usize>; 6] {
     if columns[0].len() < 2 * TRIALS {
         return [const { Vec::new() }; 6];

@@ -36,7 +36,7 @@ impl Packed {
         self.steps.abs().mean()
     }
 
-    /// A range of samples, which must exist.
+    /// Returns a range of samples, which must exist.
     pub fn part(&self, samples: Range<usize>) -> Vec<Vector3<f64>> {
         let mut part = Vec::with_capacity(samples.len());
         let mut axes = [[0i64; FRAME]; 3];
@@ -61,7 +61,7 @@ impl Packed {
     }
 }
 
-/// Packer for samples of three axes, one by one.
+/// Packs samples of three axes one by one.
 #[derive(Debug)]
 pub struct Packer {
     /// Step of each axis, in the input quantity.
@@ -141,7 +141,7 @@ const STEPS_OF_GRID: f64 = 16.0;
 /// Number of steps up to the largest value, if no noise is found.
 const STEPS_OF_RANGE: f64 = 4_294_967_296.0;
 
-/// Largest step for an axis with these values such that the packing error is negligible against its noise.
+/// The largest step for which the packing error of an axis with these values is negligible compared with its noise.
 pub fn finest_step(values: &[f64]) -> f64 {
     let bend = |three: &[f64]| (three[0] - 2.0 * three[1] + three[2]).powi(2);
     let of_frame = |frame: &[f64]| {

@@ -1,4 +1,4 @@
-//! Moves according to gyros and table: angle and time.
+//! Comparison of moves according to the gyros and according to the table, by angle and time.
 
 use std::ops::Range;
 
@@ -21,7 +21,7 @@ pub struct Move {
     /// Total angle according to the gyros and to the table, counting both senses of rotation, rad.
     gyros: f64,
     table: f64,
-    /// Mean time according to the table, and delay of the gyros, s.
+    /// Mean time of the move according to the table, and delay of the gyros relative to the table, s.
     pub time: f64,
     pub late: f64,
     /// Tolerance for the difference of the two angles of one move, rad.
@@ -59,8 +59,8 @@ fn way(steps: impl Iterator<Item = (f64, f64, f64)>, noise: f64, zero: f64) -> [
     [all, moment / all.max(f64::MIN_POSITIVE), fastest]
 }
 
-/// Reports moves for which gyros and table differ in angle or time; if there are none, a gyro scale factor that all moves
-/// together contradict.
+/// Reports moves for which gyros and table differ in angle or time; if there are none, reports a gyro scale factor that
+/// all moves together contradict.
 ///
 /// This reveals missing rows in one log, clock drift and logs from different runs, for any time stamps.
 pub fn clock(run: &Run) -> Option<String> {
@@ -68,9 +68,10 @@ pub fn clock(run: &Run) -> Option<String> {
     let mut others = moves.iter().filter(|of| of.differs());
     if let Some(first) = others.next() {
         return Some(format!(
-            "In {} of {} moves the gyros and the table turn by different angles. The first is at {:.1} s: the gyros \
-             measure {:.1}°, the table {:.1}°. Look for lost, repeated, clipped or wrapped rows there, or for logs \
-             from different runs or clocks. Otherwise check gyro_unit, scale and the unit of the table angles.",
+            "In {} of {} moves, the gyros and the table turn by different angles. In the first of these moves, at \
+             {:.1} s, the gyros measure {:.1}°, the table {:.1}°. Look for lost, repeated, clipped or wrapped rows in \
+             these moves, and for logs from different runs or clocks; if you find none, check gyro_unit, scale and \
+             the unit of the table angles.",
             1 + others.count(),
             moves.len(),
             first.time,
@@ -99,7 +100,7 @@ fn other_times(moves: &[Move], resolved: f64, period: f64) -> Option<String> {
     let (low, high) = (late().reduce(f64::min)?, late().reduce(f64::max)?);
     if high - low <= resolved {
         return Some(format!(
-            "The gyros turn {} than the table in all {} moves. Convert both logs to the same clock.",
+            "In all {} moves, the gyros turn {} than the table. Convert both logs to the same clock.",
             by(low.midpoint(high)),
             moves.len()
         ));
@@ -110,8 +111,8 @@ fn other_times(moves: &[Move], resolved: f64, period: f64) -> Option<String> {
     let (change, jump) = changes.max_by(|one, other| one.0.abs().total_cmp(&other.0.abs()))?;
     if change.abs() > 0.5 * (high - low) {
         return Some(format!(
-            "Between the moves at {:.1} s and {:.1} s the gyros start to turn {} than the table. Either {} about \
-             {:.0} rows there, or the table log jumps. Correct the wrong log.",
+            "Between the moves at {:.1} s and {:.1} s, the gyros start to turn {} than the table. Either {} about {:.0} \
+             rows between these moves, or the table log jumps. Correct the wrong log.",
             jump[0].time,
             jump[1].time,
             by(change),
@@ -127,9 +128,9 @@ fn other_times(moves: &[Move], resolved: f64, period: f64) -> Option<String> {
     let apart = (last.late - first.late) / (last.time - first.time);
     let at = |of: &Move| nanoseconds((of.time * 10.0).round() / 10.0);
     Some(format!(
-        "The clocks of IMU and table drift apart by {:.0} ppm: the gyros turn {} than the table in the move at {} s, \
-         and {} in the move at {} s. Scale factors are wrong by the same amount. Check both logs for lost or repeated \
-         rows, and check sample_period_s and the time stamps.",
+        "The clocks of the IMU and the table drift apart by {:.0} ppm: the gyros turn {} than the table in the move \
+         at {} s, and {} in the move at {} s. The scale factors have an error of the same size. Check both logs for lost or \
+         repeated rows, and check sample_period_s and the time stamps.",
         apart / PPM,
         by(first.late),
         at(first),
@@ -149,8 +150,8 @@ fn scale(run: &Run, moves: &[Move]) -> Option<String> {
     let off = gyros / table - 1.0;
     (table > 0.0 && off.abs() > SIGMAS * sigma + sum(|m| m.zero) / table).then(|| {
         format!(
-            "Over all {} moves the gyros turn {:.0} ppm {} than the table, but scale_sigma_ppm of [imu.prior.gyro] \
-             states {:.0} ppm. Check scale and scale_sigma_ppm there, and gyro_unit.",
+            "Over all {} moves, the gyros turn {:.0} ppm {} than the table, but scale_sigma_ppm of [imu.prior.gyro] \
+             states {:.0} ppm. Check gyro_unit, and scale and scale_sigma_ppm in [imu.prior.gyro].",
             moves.len(),
             off.abs() / PPM,
             if off > 0.0 { "more" } else { "less" },
@@ -174,9 +175,9 @@ fn bias_at_rest(run: &Run, stands: &[Dwell]) -> (Vector3<f64>, f64) {
     (bias, SIGMAS * sigma.min(prior.bias_sigma.norm()))
 }
 
-/// Moves that both logs resolve, each from the middle of one standstill of the table to the middle of the next, and the
-/// spans before the first and after the last that both logs cover. Two moves treated as one would have a time error if
-/// the scale factors of their axes differ.
+/// Returns the moves that both logs resolve, each from the middle of one standstill of the table to the middle of the
+/// next. Also returns the spans before the first move and after the last move that both logs cover. If two moves were
+/// treated as one and the scale factors of their axes differed, the move would have a time error.
 pub fn moves(run: &Run, table: &TableLog) -> Vec<Move> {
     let imu = &run.recording.imu;
     let stands = standstills(run, table);

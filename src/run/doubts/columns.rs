@@ -1,4 +1,4 @@
-//! Columns impossible for a working instrument.
+//! Detection of columns that a working instrument cannot produce.
 
 use nalgebra::Vector3;
 use statrs::function::erf::erf;
@@ -11,7 +11,7 @@ use crate::statistics::FALSE_ALARM;
 /// Reports axes whose values equal those of another axis in every row.
 ///
 /// Each axis has its own noise, so even two axes with the same input differ. An axis that never changes is not
-/// reported: it may be at rest with coarse pulses.
+/// reported, because it may be at rest with coarse pulses.
 pub fn copied(run: &Run) -> Option<String> {
     let pairs = listed(run, |sensor, rows| {
         let alike = |&(one, other): &(usize, usize)| {
@@ -24,8 +24,8 @@ pub fn copied(run: &Run) -> Option<String> {
         words.collect()
     })?;
     Some(format!(
-        "These columns are equal in every row: {pairs}. A column is named twice or was copied; correct the column \
-         names in run.toml."
+        "The values of these columns are equal in every row: {pairs}. The same column was named or copied twice; \
+         correct the column names in run.toml."
     ))
 }
 
@@ -44,8 +44,8 @@ pub fn dead(run: &Run) -> Option<String> {
         words.collect()
     })?;
     Some(format!(
-        "These columns never change ({} rows), although their noise should make them vary: {axes}. The axis is dead, \
-         or run.toml names the wrong column.",
+        "These columns never change ({} rows), although their noise should make them vary: {axes}. Either the axis is \
+         dead, or run.toml names the wrong column.",
         imu.len()
     ))
 }

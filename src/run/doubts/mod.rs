@@ -1,4 +1,4 @@
-//! Checks of a run on input. They report unusual but possible facts.
+//! Checks of a run when it is read, which report unusual but possible facts.
 
 pub mod clock;
 mod columns;
@@ -24,8 +24,8 @@ impl Run {
         checks.iter().filter_map(|check| check(self)).collect()
     }
 
-    /// A sentence on the true order of the table's quaternions, or on their inverse, if gravity contradicts the stated
-    /// order.
+    /// A sentence that states the true order or direction of the table quaternions, if gravity contradicts the stated
+    /// one.
     pub fn table_quaternions(&self) -> Option<String> {
         quaternions::order(self)
     }
@@ -39,9 +39,9 @@ fn gravity(run: &Run) -> Option<String> {
     let limit = chi_square_limit(1.0, FALSE_ALARM).sqrt() * sigma;
     (site.is_known && off.abs() > limit).then(|| {
         format!(
-            "gravity_m_s2 = {} is {:.0} mGal {} normal gravity at latitude {}°, height {:.0} m (limit {:.0} mGal, \
-             false-alarm rate 0.1 %). This difference goes directly into the accelerometer scale factors. Check \
-             gravity_m_s2, latitude_deg and height_m.",
+            "gravity_m_s2 = {} is {:.0} mGal {} normal gravity at a latitude of {}° and a height of {:.0} m (limit \
+             {:.0} mGal, false-alarm rate 0.1 %). The accelerometer scale factors change in the same proportion. \
+             Check gravity_m_s2, latitude_deg and height_m.",
             value(site.gravity, 1e-4),
             off.abs() / MILLIGAL,
             if off > 0.0 { "above" } else { "below" },
@@ -66,8 +66,8 @@ fn coverage(run: &Run) -> Option<String> {
     let [first, last, start, end] = [first, last, start, end].map(nanoseconds);
     (!off.is_empty()).then(|| {
         format!(
-            "The table log ({first}–{last} s) {} the IMU log ({start}–{end} s). The rest of the IMU log cannot be \
-             used. Check that both logs come from the same run and clock.",
+            "The table log ({first}–{last} s) {} the IMU log ({start}–{end} s). The other parts of the IMU log cannot \
+             be used. Check that both logs come from the same run and use the same clock.",
             off.join(" and ")
         )
     })

@@ -1,4 +1,4 @@
-//! Table quaternions in a different order, or of the inverse rotation.
+//! Detection of table quaternions that are in a different order or describe the inverse rotation.
 
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
@@ -14,7 +14,7 @@ type Reading = fn(&Matrix3<f64>) -> Matrix3<f64>;
 /// Reports quaternions that agree with the accelerometers' gravity only if their columns are in another order, or
 /// if they rotate East-North-Up to the body.
 ///
-/// Specific force at rest points up, except for errors within the prior σ. The likelihood ratio of two hypotheses
+/// Specific force at rest points up, apart from errors within the prior σ. The likelihood ratio of two hypotheses
 /// follows from their sums of squared residuals, with the variance estimated from each sum. For the stated order, the
 /// best of all 48 axis orders of the accelerometers is used, because that order is also only stated and is tested by
 /// another check.
@@ -45,7 +45,7 @@ pub fn order(run: &Run) -> Option<String> {
             w_last,
         ),
         (
-            "rotate East-North-Up to body instead of body to East-North-Up. Reverse the signs of x, y and z",
+            "are rotations from East-North-Up to body, not from body to East-North-Up. Reverse the signs of x, y and z",
             |attitude| attitude.transpose(),
         ),
     ];
@@ -57,7 +57,8 @@ pub fn order(run: &Run) -> Option<String> {
     let (log_ratio, words) = likelier.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
     (log_ratio > limit).then(|| {
         format!(
-            "the table quaternions {words} (this makes the measured gravity in {} dwells 10^{:.0} times more likely)",
+            "the table quaternions {words} (with this change, the measured gravity in {} dwells is 10^{:.0} times \
+             more likely)",
             rests.len(),
             log_ratio / std::f64::consts::LN_10
         )

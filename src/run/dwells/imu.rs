@@ -1,4 +1,4 @@
-//! Standstills in the output of the instrument.
+//! Detection of standstills in the output of the instrument.
 
 use std::collections::VecDeque;
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, SQRT_2};
@@ -7,7 +7,7 @@ use std::ops::Range;
 use nalgebra::Vector3;
 
 use crate::earth::ROTATION_RATE;
-use crate::imu::Sensor;
+use crate::imu::{Sensor, rounding_error};
 use crate::navigation::samples_of;
 use crate::recording::ImuSamples;
 use crate::recording::faults::ranges;
@@ -19,15 +19,15 @@ use crate::units::DEG_PER_H;
 const WINDOW: f64 = 0.25;
 /// Minimum length of a standstill in windows, because a released sensor still swings.
 const FEWEST: usize = 4;
-/// A standstill of this many seconds between two moves is always found. At its ends, up to one window in total is lost;
-/// at each end, the next window differs from its neighbour, and the one after that is dropped because it may be a
-/// gentle move.
+/// A standstill of this many seconds between two moves is always found. At its ends, up to one window in total is lost.
+/// At each end, the next window differs from its neighbour, and the window after that is dropped because it may contain
+/// a gentle move.
 pub const LONG_ENOUGH: f64 = (1 + 2 * 2 + FEWEST) as f64 * WINDOW;
 /// Output at rest varies by less than this many σ of its noise, plus a rate and a force.
 pub const STILL_SIGMAS: f64 = 6.0;
-/// Rate, rad/s: drift of the worst bias within seconds.
+/// Rate, rad/s: the drift of the worst bias within seconds.
 pub const STILL_RATE: f64 = 100.0 * DEG_PER_H;
-/// Force, m/s²: that of a turn by 0.02°.
+/// Force, m/s²: the change of force in a turn by 0.02°.
 pub const STILL_FORCE: f64 = 3e-3;
 /// False-alarm rate of the test that ends a standstill at a window that differs from its neighbours: an axis
 /// has started to turn, or still settles. A false alarm costs a window.
@@ -104,10 +104,14 @@ impl Windows {
         let found = SIGMA_OF_MEDIAN * FRAC_1_SQRT_2 * median(&mut known).unwrap_or(0.0);
         let stated = run.instrument.noise.get(sensor).random_walk / duration.sqrt();
         let pulse = imu.pulse.get(sensor) / duration;
+        // A mean of rounded values lies anywhere within a step unless their noise is as large as the step.
+        let step = imu.resolution(sensor).max();
+        let noise = stated.powi(2) * slide.length as f64 - step.powi(2) / 12.0;
+        let rounding = rounding_error(step, noise.max(0.0)).sqrt();
         Self {
             slide,
             means,
-            sigma: found.max(stated).max(pulse),
+            sigma: found.max(stated).max(pulse).max(rounding),
         }
     }
 

@@ -1,4 +1,4 @@
-//! Dwells, during which the instrument is at rest: found from the table's readings or, without a table, from the
+//! Detection of dwells, during which the instrument is at rest, from the table readings or, without a table, from the
 //! output of the instrument.
 
 pub mod imu;
@@ -19,11 +19,11 @@ use imu::{STILL_FORCE, STILL_RATE, STILL_SIGMAS};
 const STILL_ANGLE: f64 = 0.1 * DEGREE;
 
 impl Run {
-    /// The dwells, in order.
+    /// The dwells, in order of time.
     ///
-    /// The standstills of a table log are checked against the gyros. A standstill during which they turn is not a dwell
-    /// (two readings may miss a full turn). Two standstills without a turn in between are merged (they were separated
-    /// by a wild reading or a knock).
+    /// The standstills of a table log are checked against the gyros. A standstill during which the gyros turn is not a
+    /// dwell, because two readings may miss a full turn. Two standstills without a turn between them are merged,
+    /// because they were separated only by an outlier or a knock.
     pub fn dwells(&self, aiding: Aiding) -> Vec<Dwell> {
         let imu = &self.recording.imu;
         if imu.is_of_means() {

@@ -1,4 +1,4 @@
-//! Standstills in the table log.
+//! Detection of standstills in the table log.
 
 use std::ops::Range;
 
@@ -33,7 +33,7 @@ pub fn same_reading(run: &Run, before: &Position, after: &Position) -> bool {
     log(&(after.attitude * before.attitude.transpose())).norm() < limit(run, share)
 }
 
-/// Stretches of the log with constant readings.
+/// Stretches of the table log with constant readings.
 pub fn standstills(run: &Run, table: &TableLog) -> Vec<Dwell> {
     // Two readings of three components each.
     let limit = limit(run, 6.0);

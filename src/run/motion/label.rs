@@ -33,9 +33,9 @@ pub struct LabelCheck {
     pub segment: Segment,
     /// Result of the comparison.
     pub verdict: Verdict,
-    /// Disagreement between label and recording, worded to follow `section … `.
+    /// Description of the disagreement between label and recording, worded so that it can follow `section … `.
     pub disagreement: Option<String>,
-    /// The samples that agree with the label, if any.
+    /// The samples that agree with the label, if there are any.
     pub as_labelled: Option<Range<usize>>,
 }
 
@@ -48,7 +48,7 @@ pub enum Verdict {
     Position {
         /// Angle between the measured and the labelled up direction, rad.
         off: f64,
-        /// Time for which the section moves, s.
+        /// Time for which the instrument moves in the section, s.
         moving: f64,
     },
     /// The label is a turn.
@@ -87,7 +87,8 @@ pub fn checks(run: &Run, rests: &[Rest]) -> Vec<LabelCheck> {
             Some(LabelledMotion::Stands { up }) => record.position(segment, &up),
             Some(LabelledMotion::Turns { axis, angle }) => record.turn(segment, &axis, angle),
             None => {
-                let nothing = "is neither a position (x_up … z_down) nor a turn (rot_x+360), so it has no effect";
+                let nothing = "is neither a position (x_up … z_down) nor a turn (rot_x+360), so the label has no \
+                effect";
                 (Verdict::Unknown, Some(nothing.to_owned()), None)
             }
         };
@@ -160,8 +161,7 @@ impl Record<'_> {
         let to_rests = angle(&whole).dot(axis);
         let is_more = !imu.continuous || (to_rests - within).abs() > LOST;
         if is_more && (turns(samples.start..first) || turns(last..samples.end)) {
-            let words =
-                "starts or ends during the turn: extend it until the sensor is still at both ends";
+            let words = "starts or ends during the turn: extend the section until the sensor is still at both ends";
             let as_labelled = (as_said(to_rests) && whole != samples).then_some(whole);
             return (verdict, Some(words.to_owned()), as_labelled);
         }

@@ -1,5 +1,5 @@
 //! Motion of the instrument in a recording, from nominal scales and prior biases: dwells, turns, and their agreement
-//! with labels. Shared by the checks of a recording and by the estimators.
+//! with labels. The checks of a recording and the estimators share this module.
 
 mod label;
 mod rest;

@@ -11,7 +11,7 @@ const UPRIGHT: f64 = 10.0 * DEGREE;
 /// A dwell, evaluated with nominal scales and prior biases.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rest {
-    /// Samples, and the table's position.
+    /// The samples and the table position of the dwell.
     pub dwell: Dwell,
     /// Mean specific force along body axes, m/s².
     pub force: Vector3<f64>,
@@ -55,7 +55,7 @@ impl Rest {
     }
 }
 
-/// The dwells, in order.
+/// The dwells, in order of time.
 pub fn rests(run: &Run) -> Vec<Rest> {
     let rest = |dwell: Dwell| {
         let force = dwell.force(run);

@@ -26,7 +26,7 @@ const NEAR_AXIS: f64 = 15.0 * DEGREE;
 pub struct Turn {
     /// Samples.
     pub samples: Range<usize>,
-    /// Unit vector along body axes, in their positive half.
+    /// Unit vector of the rotation axis, along body axes; its largest component is positive.
     pub axis: Vector3<f64>,
     /// Angle about the axis, right-handed, rad; for a turn about several axes, the angle of the equivalent single
     /// rotation.
@@ -48,7 +48,7 @@ pub struct Turn {
 }
 
 impl Turn {
-    /// The turn over these samples, with `zero` the gyros' output at rest, rad/s.
+    /// The turn over these samples, where `zero` is the gyro output at rest, rad/s.
     pub fn of(run: &Run, samples: Range<usize>, zero: &Vector3<f64>) -> Self {
         let imu = &run.recording.imu;
         let mut attitude = Matrix3::identity();
@@ -99,7 +99,7 @@ pub fn zero(run: &Run, rests: &[Rest], sample: usize) -> Vector3<f64> {
     })
 }
 
-/// The turns from dwell to dwell, or in sections labelled as turns.
+/// The turns from one dwell to the next, or the turns in sections that are labelled as turns.
 pub fn turns(run: &Run, rests: &[Rest]) -> Vec<Turn> {
     let imu = &run.recording.imu;
     let turn = |samples: Range<usize>| {

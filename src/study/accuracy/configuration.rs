@@ -11,7 +11,7 @@ use crate::simulation::Scenario;
 pub struct AccuracyStudy {
     /// The simulated scenario.
     pub scenario: Scenario,
-    /// The filter's misalignment form; the truth has the form of the scenario.
+    /// The misalignment form of the filter; the truth has the form of the scenario.
     pub form: InstallationForm,
     /// Error terms of the truth that the filter does not model.
     pub unmodelled: Vec<ErrorTerm>,

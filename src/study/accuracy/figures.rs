@@ -6,7 +6,7 @@ use crate::calibration::{
 };
 use crate::study::Ratio;
 
-/// Figures of one kind of error over all runs, in SI.
+/// Figures of one kind of error over all runs, in SI units.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Figures {
     /// RMS error of the filter.
@@ -21,7 +21,7 @@ pub struct Figures {
     pub closed_form: Option<f64>,
     /// RMS error of the closed form in its own time, divided by that of the filter.
     pub gain: Option<Ratio>,
-    /// RMS error of the closed form in the table time of the filter; `None` if that is too short.
+    /// RMS error of the closed form in the table time of the filter; `None` if this time is too short.
     pub closed_form_in_equal_time: Option<f64>,
     /// RMS error of the closed form in the table time of the filter, divided by that of the filter.
     pub gain_in_equal_time: Option<Ratio>,

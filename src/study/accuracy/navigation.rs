@@ -49,7 +49,7 @@ pub struct NavigationAccuracy {
     pub journey: Journey,
     /// Position errors of every run, in order.
     pub positions: Vec<Position>,
-    /// Horizontal position errors in m; σ and bound are roots of the trace of their covariance.
+    /// Horizontal position errors in m; the σ and the bound are the square roots of the traces of their covariances.
     pub figures: Figures,
     /// Containment in each of [`Region::ALL`]; empty if no run gave an estimate with a regular covariance.
     pub containment: Vec<Containment>,
@@ -62,7 +62,7 @@ pub enum Region {
     East,
     /// North within ±1σ.
     North,
-    /// East and north within the ellipse of this many σ.
+    /// The east and north errors are within the ellipse of this many σ.
     Ellipse(f64),
 }
 
@@ -75,11 +75,12 @@ pub struct Containment {
     pub within: usize,
     /// Number of runs.
     pub runs: usize,
-    /// 99 % interval of the number within, if the covariance is correct (binomial).
+    /// 99 % interval of the number of runs within the region if the covariance is correct (binomial).
     pub interval: (usize, usize),
 }
 
-/// Linear model of a mission, computed once: the model of one instrument is valid for all instruments of its grade.
+/// Linear model of a mission. It is computed once, because the model of one instrument is valid for all instruments of
+/// its grade.
 pub struct Way {
     journey: Journey,
     by_parameter: SMatrix<f64, 2, PARAMETERS>,

@@ -14,14 +14,14 @@ use crate::run::Aiding;
 use crate::simulation::Runs;
 use crate::study::StudyError;
 
-/// A run of the study. Errors are estimate minus truth; everything is in the general form.
+/// A run of the study. Errors are estimate minus truth; all values are in the general form.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Trial {
-    /// Number, the stream of its random numbers.
+    /// Number of the run, which selects its stream of random numbers.
     pub run: u64,
     /// Reason for failure of the filter; `None` if it did not fail.
     pub failure: Option<String>,
-    /// Results of the filter; for a run that did not converge, those of its last pass.
+    /// Results of the filter; for a run that did not converge, the results of its last pass.
     pub filtered: Option<Filtered>,
     /// σ of the bound.
     pub bound: ParameterVector,
@@ -29,7 +29,7 @@ pub struct Trial {
     pub(super) bound_covariance: ParameterMatrix,
     /// σ of the bound of the auxiliary constants; zero for constants without a bound.
     pub auxiliary_bound: AuxiliaryVector,
-    /// Evidence for each error term; for the first run only.
+    /// Evidence for each error term, in the first run only.
     pub effects: Vec<TermEvidence>,
     /// Error of the closed form in its own time and in the filter's; `None` if it failed.
     pub(super) closed_form: [Option<ParameterVector>; 2],

@@ -10,15 +10,16 @@ pub(super) type ByParameter = SMatrix<f64, 2, PARAMETERS>;
 
 /// Budget of the final position error from the stated covariance, averaged over all instruments.
 ///
-/// Errors of groups are correlated: the filter determines many sums better than their terms. A group's share is the
-/// covariance of its contribution with the total, over the variance of the total,
+/// The errors of groups are correlated, because the filter determines many sums of parameters better than the
+/// individual parameters. The share of a group is the covariance of its contribution with the total, divided by the
+/// variance of the total,
 ///
 /// ```text
 /// share_g = tr(S_g P_g· Sᵀ) / tr(S P Sᵀ)
 /// ```
 ///
-/// so the cross terms of two groups are divided equally between them, and all shares add up to one. A
-/// negative share belongs to a group that compensates another.
+/// so the cross terms of two groups are divided equally between them, and all shares add up to one. A group that
+/// compensates another group has a negative share.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Budget {
     /// Stated RMS position error, nmile.

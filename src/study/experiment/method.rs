@@ -17,7 +17,7 @@ pub(super) const POSITIONS: &str = "six-position";
 /// A filter path with the table time of the closed form.
 const HOUR_PATH: &str = "three-axis-hour";
 
-/// An estimator with its path.
+/// An estimator and its path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum Estimator {
     /// The closed form on the static positions of the paper.
@@ -31,7 +31,7 @@ pub enum Estimator {
     LongFilter,
 }
 
-/// An estimator in a misalignment form.
+/// An estimator with a misalignment form.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Method {
     /// The estimator.
@@ -57,7 +57,7 @@ impl Method {
 /// One instrument.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Trial {
-    /// Number, the stream of its random numbers.
+    /// Number of the instrument, which selects its stream of random numbers.
     pub run: u64,
     /// Calibration by each of [`Method::all`], or the reason for failure.
     pub calibrations: Vec<Result<Calibrated, String>>,
@@ -70,7 +70,7 @@ impl Trial {
     }
 }
 
-/// A calibration, in the general form.
+/// A calibration in the general form.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Calibrated {
     /// Errors, true − estimated.
@@ -110,7 +110,7 @@ impl Scenarios {
         Ok(times)
     }
 
-    /// One instrument, the same for all methods.
+    /// Simulates one instrument, which is the same for all methods.
     pub fn trial(&self, seed: u64, run: u64) -> Result<Trial, StudyError> {
         let mut calibrations = Vec::new();
         for (estimator, scenario) in &self.0 {

@@ -1,5 +1,5 @@
-//! Effect of instrument noise during alignment and navigation. It is the same after every calibration and is therefore
-//! treated separately.
+//! Effect of instrument noise during alignment and navigation. This effect is the same after every calibration and is
+//! therefore treated separately.
 
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 use rand::{RngExt, SeedableRng};
@@ -51,8 +51,8 @@ impl Variances {
     }
 }
 
-/// Covariance of the final horizontal position error, east and north, m². If the instrument aligned
-/// itself, `aligned` gives the errors at the start per error of the sensed rate and force.
+/// Covariance of the final horizontal position error, east and north, m². If the instrument aligned itself, `aligned`
+/// gives the errors at the start for a unit error of the sensed rate and force.
 pub fn position(
     mission: &Mission,
     aligned: Option<InputMatrix>,
@@ -148,18 +148,18 @@ pub fn spread(covariance: &Matrix2<f64>) -> Spread {
     Spread::of((0..DRAWS).map(|_| Vector2::new(sigma.x * draw(), sigma.y * draw()).norm()))
 }
 
-/// Errors at the start of a body at rest that levels itself with its accelerometers and finds North with
-/// its gyros, per error of the sensed rate (rad/s) and specific force (m/s²) along body axes.
+/// Errors at the start, for a unit error of the sensed rate (rad/s) and specific force (m/s²) along body axes. The body
+/// is at rest, levels itself with its accelerometers and finds north with its gyros.
 ///
-/// The computed attitude makes the sensed force point up, and gives the sensed rate no East component.
-/// With `C_computed = (I − [φ×]) C` and sensed `u + δu`, δu in East-North-Up, to first order
+/// With the computed attitude, the sensed force points up and the sensed rate has no East component. With `C_computed =
+/// (I − [φ×]) C` and sensed `u + δu`, δu in East-North-Up, to first order
 ///
 /// ```text
 /// 0 = ∇ − φ × (0, 0, g)                  φ_E = −∇_N / g,   φ_N = ∇_E / g
 /// 0 = ε_E − (φ × ω_ie)_E                 φ_U = φ_N tan L − ε_E / (Ω cos L)
 /// ```
 ///
-/// (Groves, 2nd ed., §5.6.2 has the same in North-East-Down.)
+/// (Groves, 2nd ed., §5.6.2, gives the same equations in North-East-Down.)
 pub fn by_itself(at: &Solution) -> InputMatrix {
     let gravity = normal_gravity(at.latitude, at.height);
     let (sin, cos) = at.latitude.sin_cos();

@@ -1,4 +1,4 @@
-//! Distribution of a length over instruments.
+//! Distribution of an error length over instruments.
 
 use serde::Serialize;
 
@@ -11,7 +11,7 @@ pub struct Spread {
     pub median: f64,
     /// The mean.
     pub mean: f64,
-    /// Root of the mean square.
+    /// Root mean square.
     pub rms: f64,
     /// First and third quartile.
     #[serde(skip)]

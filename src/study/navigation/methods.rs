@@ -1,4 +1,4 @@
-//! Navigation with the calibrations of several methods, side by side.
+//! Comparison of navigation with the calibrations of several methods.
 
 use rayon::prelude::*;
 
@@ -16,11 +16,11 @@ pub struct MethodOutlook {
     pub outlook: Vec<Outlook>,
 }
 
-/// Navigates stationary and level at a site with the calibration of each method, for a duration suited to all. The truth
-/// may be unknown.
+/// Navigates stationary and level at a site with the calibration of each method, for a duration that suits all
+/// calibrations. The truth may be unknown.
 ///
 /// # Errors
-/// [`NavigationStudyError`] if the site is at a pole or a calibration is singular.
+/// Returns [`NavigationStudyError`] if the site is at a pole or a calibration is singular.
 pub fn navigate_with_each(
     site: &Site,
     methods: &[(&'static str, &Estimate)],

@@ -5,7 +5,7 @@ use nalgebra::SVector;
 use crate::navigation::error_model::STATES;
 use crate::navigation::{ErrorMatrix, NavigationError};
 
-/// Navigation error at one moment, if known.
+/// Navigation error at one moment, if it is known.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outlook {
     /// Time since the start, s.

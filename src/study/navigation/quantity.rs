@@ -11,12 +11,12 @@ const ANGLES: Units = &[("°", DEGREE), ("″", ARCSEC)];
 const SPEEDS: Units = &[("m/s", 1.0), ("cm/s", 0.01), ("mm/s", 0.001)];
 const LENGTHS: Units = &[("nmile", NAUTICAL_MILE), ("m", 1.0)];
 
-/// A component of the error, or the horizontal length of two.
+/// A component of the navigation error, or the horizontal length of two components.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Quantity {
     /// Name, such as `pitch`.
     pub name: &'static str,
-    /// Name in documents, with its unit.
+    /// Name in documents, with the unit.
     pub key: &'static str,
     /// Index in [`Outlook::sigma`]; for a horizontal length, that of its first component.
     place: usize,
@@ -43,7 +43,7 @@ const fn horizontal(place: usize, name: &'static str, key: &'static str, units: 
 }
 
 impl Quantity {
-    /// Attitude, velocity, position, three each.
+    /// The components of attitude, velocity and position, three of each.
     pub const ALL: [Self; 9] = [
         component(0, "pitch", "pitch_deg", ANGLES),
         component(1, "roll", "roll_deg", ANGLES),
@@ -56,12 +56,12 @@ impl Quantity {
         horizontal(6, "position, horizontal", "position_nmile", LENGTHS),
     ];
 
-    /// Name up to the comma, without the kind of length.
+    /// The part of the name before the comma, without the kind of length.
     pub fn short(self) -> &'static str {
         self.name.split(',').next().unwrap_or(self.name)
     }
 
-    /// Symbol of its unit in documents and tables.
+    /// Symbol of the unit in documents and tables.
     pub fn unit(self) -> &'static str {
         self.units[0].0
     }
@@ -70,8 +70,8 @@ impl Quantity {
         self.units[0].1
     }
 
-    /// A unit in which values up to `largest` (in the usual unit) have few zeros, and the factor that converts from the
-    /// usual unit to it.
+    /// A unit in which values up to `largest` (in the usual unit) have few zeros, and the factor that converts the
+    /// usual unit to this unit.
     pub fn readable_unit(self, largest: f64) -> (&'static str, f64) {
         let (unit, value) = readable(self.units, largest * self.unit_value());
         (unit, self.unit_value() / value)

@@ -1,4 +1,4 @@
-//! Missions of a duration suited to the grade, and their navigation errors with a calibration.
+//! Missions whose duration suits the grade of the instrument, and their navigation errors with a calibration.
 
 use super::outlook::{Outlook, sigma};
 use super::{INTERVAL, Mission, NavigationStudyError, Pair};
@@ -21,11 +21,12 @@ const DURATIONS: [f64; 17] = [
 const MOMENTS: f64 = 20.0;
 
 impl Mission {
-    /// Stationary and level at a site, for a duration suited to the grade: the longest round duration after which the
-    /// predicted errors of every estimate are still small, from seconds (low grade) to hours (navigation grade).
+    /// A mission in which the body is stationary and level at a site; its duration suits the grade of the instrument.
+    /// The duration is the longest round duration after which the predicted errors of every estimate are still small;
+    /// it ranges from seconds (low grade) to hours (navigation grade).
     ///
     /// # Errors
-    /// As for [`Self::navigate`].
+    /// The errors of [`Self::navigate`].
     pub fn suited(site: &Site, estimates: &[&Estimate]) -> Result<Self, NavigationStudyError> {
         let duration = estimates
             .iter()
@@ -77,7 +78,7 @@ impl Mission {
     /// misalignment form.
     ///
     /// # Errors
-    /// As for [`Self::navigate`].
+    /// The same errors as [`Self::navigate`].
     pub fn outlook(
         &self,
         estimate: &Estimate,

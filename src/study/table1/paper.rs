@@ -1,4 +1,4 @@
-//! The paper's table as printed (Zhao, Jiang, Li 2016, Table 1), and its possible readings.
+//! The table as printed in the paper (Zhao, Jiang, Li 2016, Table 1), and its possible readings.
 
 use nalgebra::Vector3;
 
@@ -10,8 +10,8 @@ use crate::imu::{InstallationForm, Sensor, Triad};
 pub const SAMPLES: usize = 50;
 /// Length of the runs, h.
 pub const HOURS: f64 = 40.0;
-/// Latitude in degrees. The paper does not state it: its accelerometer rows have heading / roll =
-/// tan L = 1.0276.
+/// Latitude in degrees. The latitude, which the paper does not state, follows from its accelerometer rows, where
+/// heading / roll = tan L = 1.0276.
 pub const LATITUDE_DEG: f64 = 45.78;
 
 /// One of the four columns of figures, mean and standard deviation, with its possible readings.
@@ -21,7 +21,7 @@ pub struct Published {
     pub sensor: Sensor,
     /// The simplified form used for calibration.
     pub form: InstallationForm,
-    /// The paper's figures of attitude and of velocity and position.
+    /// The figures in the paper for attitude, velocity and position.
     pub figures: [u8; 2],
     mean: ByQuantity<f64>,
     std: ByQuantity<f64>,
@@ -128,7 +128,7 @@ pub static TABLE: [Published; 4] = [
     },
 ];
 
-/// A reading of the paper.
+/// A possible reading of the paper.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reading {
     /// Description.
@@ -146,9 +146,9 @@ pub struct Reading {
 /// Relation of a reading to the paper's text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// The text as written.
+    /// The reading follows the text as written.
     Stated,
-    /// A correct program under another assumption.
+    /// The reading is that of a correct program with another assumption.
     Assumption,
     /// A mistake in a program.
     Slip,
@@ -157,13 +157,13 @@ pub enum Kind {
 /// Treatment of the ratios `R_mn = A_mn / A_mm` of `A = K C` from six positions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Installation {
-    /// Closed form of the misalignment form: all six ratios, or half differences of the pairs.
+    /// The closed form of the misalignment form, which uses all six ratios or the half differences of the pairs.
     OfForm,
     /// Three angles from the entries above the diagonal.
     Upper,
     /// Three angles from the entries below the diagonal.
     Lower,
-    /// Six angles, `E_zy` with the wrong sign.
+    /// Six angles, of which `E_zy` has the wrong sign.
     ZyNegated,
 }
 

@@ -2,7 +2,7 @@
 
 use crate::study::navigation::Quantity;
 
-/// The errors in the paper's table, in its order; velocity and position are horizontal.
+/// The errors in the table of the paper, in the same order; velocity and position errors are horizontal.
 pub const QUANTITIES: ByQuantity<Quantity> = {
     let [pitch, roll, heading, _, _, velocity, _, _, position] = Quantity::ALL;
     [pitch, roll, heading, velocity, position]

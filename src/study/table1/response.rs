@@ -13,7 +13,7 @@ use crate::study::navigation::{Exposure, Mission, NavigationStudyError};
 /// most 1.7e-4 above the output.
 const STEP: f64 = 30.0;
 
-/// A body at rest on the ellipsoid, level and heading north, for a time in s.
+/// A body at rest on the ellipsoid, which is level and heads north, for a time in s.
 pub fn standing(latitude: f64, duration: f64) -> Mission {
     let steps = (duration / STEP).ceil().max(1.0);
     Mission {
@@ -24,12 +24,12 @@ pub fn standing(latitude: f64, duration: f64) -> Mission {
 
 /// Navigation errors due to constant errors of the sensed rate and specific force, at evenly spaced times.
 ///
-/// At rest under constant sensor errors, the linear error model has constant coefficients: its response to each
-/// unit error (a unit bias of an otherwise ideal instrument) is computed once, and every sample is a linear combination
-/// of these responses.
+/// At rest with constant sensor errors, the linear error model has constant coefficients. Its response to each unit
+/// error (a unit bias of an otherwise ideal instrument) is computed once, and every sample is a linear combination of
+/// these responses.
 pub struct Response(Vec<Moment>);
 
-/// Navigation errors at one time per unit of the sensed errors of each triad.
+/// Navigation errors at one time for unit errors sensed by each triad.
 #[derive(Debug, Clone)]
 pub struct Moment {
     /// Time, s.
@@ -67,7 +67,7 @@ impl Response {
     }
 }
 
-/// Errors at one moment: attitude with its sign, velocity and position as norms.
+/// Errors at one moment, with signed attitude errors and norms of velocity and position.
 pub fn errors(moment: &Moment, sensor: Sensor, sensed: &Vector3<f64>) -> ByQuantity<f64> {
     let errors = moment.by_sensed.get(sensor) * sensed;
     QUANTITIES.map(|quantity| quantity.of(&errors))

@@ -3,8 +3,8 @@
 use super::paper::{Kind, Published, Reading, SAMPLES};
 use super::quantity::{ByQuantity, Moments};
 
-/// Two means agree if they differ by no more than this many standard errors of their difference: 99 %
-/// of the normal distribution.
+/// Two means agree if they differ by no more than this many standard errors of their difference, the 99 % limit of the
+/// normal distribution.
 pub const AGREEMENT: f64 = 2.576;
 /// A figure that should be zero counts as rounding if it is below this fraction of the same figure of the three-angle
 /// form.
@@ -24,17 +24,15 @@ pub enum Verdict {
     NotReproducible(Option<&'static Reading>),
 }
 
-/// Difference of the paper's mean from that of a population of `n`, in standard errors of the
-/// difference: `(m_paper − m) / (s √(1/50 + 1/n))`, with the standard deviation of the population for
-/// both samples.
+/// Mean of the paper minus mean of a population of `n` samples, in standard errors of the difference: `(m_paper − m) /
+/// (s √(1/50 + 1/n))`, with the standard deviation of the population for both samples.
 pub fn difference(paper: &Moments, population: &Moments, n: usize) -> f64 {
     let error = population.std * (1.0 / SAMPLES as f64 + 1.0 / n as f64).sqrt();
     (paper.mean - population.mean) / error
 }
 
-/// The verdict on a column of the table: from its figures as stated with their differences, and from the
-/// differences under its other readings. `three_angle` is the column of the three-angle form of the same
-/// triad.
+/// The verdict on a column of the table, from its figures under the stated reading with their differences, and from the
+/// differences under its other readings. `three_angle` is the column of the three-angle form of the same triad.
 pub fn verdict(
     published: &Published,
     three_angle: &Published,

@@ -1,4 +1,4 @@
-//! A calibration whose values a command uses.
+//! A calibration whose values are used by a command.
 
 use std::path::Path;
 
@@ -8,8 +8,8 @@ use turncal::calibration::result::Calibration;
 use turncal::calibration::{Finding, Level};
 use turncal_report::terminal::printable;
 
-/// Reads a calibration, at a temperature in °C if one is given. Refuses a calibration whose verdict is FAILED; with
-/// `force`, warns on standard error instead.
+/// Reads a calibration; if a temperature in °C is given, evaluates the calibration at this temperature. Refuses a
+/// calibration whose verdict is FAILED; with `force`, warns on standard error instead.
 pub fn usable(path: &Path, temperature: Option<f64>, force: bool) -> anyhow::Result<Calibration> {
     let record = turncal_files::read_calibration(path)?;
     if record.is_failed() {
@@ -17,8 +17,8 @@ pub fn usable(path: &Path, temperature: Option<f64>, force: bool) -> anyhow::Res
         let cause = printable(&cause(&record));
         if !force {
             bail!(
-                "{name}: the verdict is FAILED ({cause}), so its values must not be used. Calibrate again; --force \
-                 uses the values anyway"
+                "{name}: the verdict is FAILED ({cause}), so its values must not be used. Calibrate again, or add \
+                 --force to use the values anyway"
             );
         }
         tell!("warning: {name}: the verdict is FAILED ({cause}); do not use these values");

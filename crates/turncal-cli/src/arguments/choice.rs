@@ -1,4 +1,4 @@
-//! Options whose value is one of a few names.
+//! Options that accept one of a few names.
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
@@ -14,7 +14,7 @@ type Choice<T> = (&'static str, &'static str, T);
 pub const METHODS: [Choice<Method>; 2] = [
     (
         "ekf",
-        "Extended Kalman filter over the whole run",
+        "Extended Kalman filter that uses the whole run",
         Method::Ekf,
     ),
     (
@@ -45,7 +45,7 @@ pub const REQUIRED: [Choice<&str>; 9] = [
 pub const FORMS: [Choice<InstallationForm>; 3] = [
     (
         "general",
-        "Six direction cosines, rows of unit norm: `C_ii = √(1 − C_ij² − C_ik²)` (Eqs. 4 and 7)",
+        "Six direction cosines, rows with unit norm: `C_ii = √(1 − C_ij² − C_ik²)` (Eqs. 4 and 7)",
         InstallationForm::General,
     ),
     (
@@ -60,11 +60,11 @@ pub const FORMS: [Choice<InstallationForm>; 3] = [
     ),
 ];
 
-/// Observations of the filter.
+/// Kinds of observation that the filter can use.
 pub const AIDINGS: [Choice<Aiding>; 2] = [
     (
         "table",
-        "Zero velocity in every dwell, and table attitude",
+        "Zero velocity in every dwell, and the attitude of the table",
         Aiding::Table,
     ),
     (
@@ -74,7 +74,7 @@ pub const AIDINGS: [Choice<Aiding>; 2] = [
     ),
 ];
 
-/// Policies for the noise of the filter. A name without a description is not listed.
+/// Policies for choosing the noise that the filter uses. The help does not list names without a description.
 pub const NOISE: [Choice<NoisePolicy>; 4] = [
     (
         "stated",
@@ -83,13 +83,14 @@ pub const NOISE: [Choice<NoisePolicy>; 4] = [
     ),
     (
         "auto",
-        "Use the stated noise; estimate the noise from the recording if the two disagree (p < 0.001)",
+        "Use the stated noise, unless the recording contradicts it (p < 0.001); then estimate the noise from the \
+         recording",
         NoisePolicy::Auto,
     ),
     ("estimate", "", NoisePolicy::Auto),
     (
         "learnt",
-        "Estimate the noise from the recording, with the stated noise as prior",
+        "Estimate the noise from the recording, and use the stated noise as the prior",
         NoisePolicy::Learnt,
     ),
 ];

@@ -1,4 +1,4 @@
-//! Output options, identical in every command.
+//! Output options, which are the same in every command.
 
 use std::path::{Path, PathBuf};
 
@@ -10,7 +10,7 @@ use turncal_input::FileError;
 use turncal_report as report;
 use turncal_report::Document;
 
-/// Overwrite option of all commands that write files.
+/// Option to overwrite existing output, shared by all commands that write files.
 #[derive(Debug, Clone, Copy, clap::Args)]
 pub struct Overwrite {
     /// Replace the output directory if it exists and contains only turncal output
@@ -25,13 +25,13 @@ impl Overwrite {
     }
 }
 
-/// Output of the results: as a report into a directory, and as JSON or text on standard output.
+/// Where the results go: a report in a directory, and JSON or text on standard output.
 #[derive(Debug, Clone, clap::Args)]
 pub struct Delivery {
-    /// Directory for a report
+    /// Directory in which to write a report
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
-    /// Print the results as one JSON document and nothing else
+    /// Print the results as a single JSON document, without any other output
     #[arg(long)]
     json: bool,
     #[command(flatten)]
@@ -44,7 +44,7 @@ impl Delivery {
         self.output.as_deref()
     }
 
-    /// Whether JSON is requested.
+    /// Whether JSON output is requested.
     pub fn json(&self) -> bool {
         self.json
     }
@@ -68,7 +68,7 @@ impl Delivery {
     }
 }
 
-/// Delivery with its directory created.
+/// The delivery, with its output directory created.
 pub struct Begun<'a> {
     directory: Option<(&'a Path, WholeDirectory)>,
     json: bool,

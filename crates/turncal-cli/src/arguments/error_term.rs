@@ -1,4 +1,4 @@
-//! Error terms as arguments.
+//! Error terms as command-line arguments.
 
 use anyhow::bail;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
@@ -32,35 +32,35 @@ pub fn named(name: &str) -> ErrorTerm {
 fn help(term: ErrorTerm) -> &'static str {
     match term {
         ErrorTerm::GaussMarkovBias => "Gauss–Markov biases",
-        ErrorTerm::TableBase => "Level and north of the table",
+        ErrorTerm::TableBase => "Level and north errors of the table base",
         ErrorTerm::TableAxes(AxisError::Tilt) => "Non-orthogonality of the table axes",
         ErrorTerm::TableAxes(AxisError::Wobble) => {
-            "Wobble of the table axes, once and twice per turn"
+            "Wobble of the table axes, at once and twice per turn"
         }
         ErrorTerm::TableAxes(AxisError::Encoder) => {
-            "Errors of the table encoders, once and twice per turn"
+            "Errors of the table encoders, at once and twice per turn"
         }
         ErrorTerm::Instrument(term) => term.entry().help,
     }
 }
 
-/// Exits with the wrong-usage status if the term is a table error and the table is not observed.
+/// Exits with the status for wrong usage if the term is a table error and the table is not observed.
 pub fn needs_table(term: ErrorTerm, aiding: Option<Aiding>) {
     let of_table = matches!(term, ErrorTerm::TableBase | ErrorTerm::TableAxes(_));
     if of_table && aiding == Some(Aiding::Velocity) {
         let message = format!(
-            "--aiding velocity does not use the table, so {} has no effect; omit one of them\n",
+            "--aiding velocity does not use the table, so {} has no effect; omit one of the two options\n",
             term.name()
         );
         clap::Error::raw(ErrorKind::ArgumentConflict, message).exit();
     }
 }
 
-/// Fails if a run lacks what an error term needs.
+/// Fails if a run lacks the data that an error term needs.
 pub fn supported(term: ErrorTerm, problem: &Problem) -> anyhow::Result<()> {
     if !problem.model.can_have(term) {
         bail!(
-            "{}: --with {} needs {}. Omit it, or add this to the run",
+            "{}: --with {} needs {}. Omit this term, or add this to the run",
             problem.run().recording.name,
             term.name(),
             match problem.model.aiding {

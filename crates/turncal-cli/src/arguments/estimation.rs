@@ -1,4 +1,4 @@
-//! Estimation options of a run, identical for a single run and a lot.
+//! Options that control how a run is estimated, which are the same for a single run and a lot.
 
 use super::choice::{AIDINGS, FORMS, METHODS, NOISE, one_of};
 use anyhow::Context;
@@ -23,8 +23,9 @@ pub struct Estimation {
     /// Observations used by the filter [default: table if the run has a table log, otherwise velocity]
     #[arg(long, value_parser = one_of(&AIDINGS))]
     aiding: Option<Aiding>,
-    /// Error terms in addition to those switched on in run.toml. auto: averages over the absence and the usual sizes of
-    /// every term; none: only K, E and D; or names of terms to estimate in any case [default: auto]
+    /// Error terms to estimate in addition to those switched on in run.toml. auto: average over each term being absent
+    /// or having one of its usual sizes; none: only K, E and D; or names of terms that are always estimated [default:
+    /// auto]
     #[arg(long, value_name = "TERM", value_parser = with_value(), value_delimiter = ',')]
     #[serde(serialize_with = "With::names")]
     with: Vec<With>,
@@ -34,7 +35,7 @@ pub struct Estimation {
 }
 
 impl Estimation {
-    /// Exits if arguments exclude each other.
+    /// Exits if two arguments exclude each other.
     pub fn check(&self) {
         With::check(&self.with);
         let first = With::terms(&self.with).next();
@@ -51,7 +52,7 @@ impl Estimation {
         }
     }
 
-    /// Calibration problem for a run.
+    /// Calibration problem for one run.
     pub fn problem<'a>(&self, run: &'a Run, path: &std::path::Path) -> anyhow::Result<Problem<'a>> {
         if self.aiding == Some(Aiding::Table) && run.recording.table.is_none() {
             return Err(CalibrationError::NoTable).with_context(|| path.display().to_string());
@@ -82,7 +83,7 @@ impl Estimation {
         Ok(problem)
     }
 
-    /// The options, without checks that need a run.
+    /// The options, before the checks that need a run.
     pub fn options(&self) -> Options {
         Options {
             form: self.installation,

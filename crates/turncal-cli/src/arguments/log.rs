@@ -9,11 +9,11 @@ use turncal_files::draft::{Found, Stated, StatedUnit};
 use turncal_logs::DataFile;
 use turncal_report::terminal::printable;
 
-/// Statements about a log without a run.toml.
+/// Information about a log that has no run.toml.
 #[derive(Debug, Clone, PartialEq, Default, clap::Args)]
 #[command(next_help_heading = "For a log without run.toml")]
 pub struct OfLog {
-    /// File with the accelerometer rows, if the log contains only the gyros
+    /// File that contains the accelerometer rows, if the log contains only gyro data
     #[arg(long, value_name = "ACCEL.csv", conflicts_with = "stream")]
     accel_file: Option<PathBuf>,
     /// Rows per second
@@ -32,22 +32,23 @@ pub struct OfLog {
     /// deg, arcsec
     #[arg(long, value_name = "UNIT", value_parser = |text: &str| StatedUnit::parse(Sensor::Gyro, text))]
     gyro_unit: Option<StatedUnit>,
-    /// Unit of the accelerometers: m/s^2, g, or the size of one count, such as '1/16384 g'; for increments m/s, g*s
+    /// Unit of the accelerometers: m/s^2, g or the size of one count, such as '1/16384 g'; for increments m/s, g*s
     #[arg(long, value_name = "UNIT", value_parser = |text: &str| StatedUnit::parse(Sensor::Accel, text))]
     accel_unit: Option<StatedUnit>,
-    /// Sensor whose data sheet gives noise and tolerances: a name from turncal list, such as bmi088, or a TOML file
+    /// Sensor whose data sheet supplies the noise and tolerances: a name from turncal list, such as bmi088, or a TOML
+    /// file
     #[arg(long, value_name = "NAME")]
     sensor: Option<String>,
-    /// Kalibr imu.yaml that gives the noise figures and, unless --rate is given, the row rate
+    /// Kalibr imu.yaml that supplies the noise figures and, unless --rate is given, the sample rate
     #[arg(long, value_name = "YAML")]
     noise_file: Option<PathBuf>,
-    /// Stream of the instrument [default: the one with the most samples]
+    /// Stream that contains the instrument's data [default: the stream with the most samples]
     #[arg(long, value_name = "NAME")]
     stream: Option<String>,
 }
 
 impl OfLog {
-    /// Stream name and statements.
+    /// The stream name, and the information about the log that the user gave.
     pub fn stated(&self) -> anyhow::Result<(Option<&str>, Stated)> {
         let stated = Stated {
             accel_file: self.accel_file.as_deref().map(DataFile::from),
@@ -63,12 +64,12 @@ impl OfLog {
         Ok((self.stream.as_deref(), stated))
     }
 
-    /// Reads a run, or a log with the given statements; shows the fields found in a log.
+    /// Reads a run, or a log with the information given in options; for a log, shows the detected fields.
     pub fn open(&self, path: &Path) -> anyhow::Result<Opened> {
         self.open_with(path, |found| show_found(path, found))
     }
 
-    /// Reads several logs of one sensor, each of one position; `None` if it was turned in one.
+    /// Reads several logs of one sensor, each recorded in one position; `None` if the sensor was turned in any of them.
     pub fn open_positions(&self, paths: &[PathBuf]) -> anyhow::Result<Option<Vec<Opened>>> {
         let (stream, stated) = self.stated()?;
         let stated = (stream, &stated);
@@ -77,7 +78,7 @@ impl OfLog {
         })?)
     }
 
-    /// Does the same as [`Self::open`], but passes the fields found in a log to `show`.
+    /// Does the same as [`Self::open`], but passes the detected fields to `show`.
     pub fn open_with(&self, path: &Path, show: impl FnOnce(&[Found])) -> anyhow::Result<Opened> {
         let (stream, stated) = self.stated()?;
         Ok(Opened::new(path, stream, &stated, |draft| {
@@ -86,7 +87,7 @@ impl OfLog {
     }
 }
 
-/// Shows the fields found in a log on standard error.
+/// Shows the fields detected in a log on standard error.
 pub fn show_found(path: &Path, found: &[Found]) {
     tell!("Found in {}:", printable(&path.display().to_string()));
     for of in found {
@@ -108,7 +109,7 @@ pub fn run_file(text: &str) -> Result<PathBuf, String> {
     }
 }
 
-/// Path of a run.toml or a log, or `-`; for a run directory, the error gives the file in it.
+/// Path of a run.toml or a log, or `-`; if the path is a run directory, the error message names the file in it.
 pub fn run_or_log(text: &str) -> Result<PathBuf, String> {
     let path = Path::new(text);
     let inside = path.join("run.toml");

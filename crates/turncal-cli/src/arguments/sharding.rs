@@ -10,16 +10,17 @@ use crate::terminal::Runs;
 use turncal::study::{Shard, Study};
 use turncal_files::{Job, JobKind, Part, part_is_there, write_part};
 
-/// The part of a study to compute.
+/// The part of a study that this process computes.
 #[derive(Debug, Clone, Copy, clap::Args)]
 pub struct Sharding {
-    /// Compute part i of M of the runs and write it to DIR for turncal merge
+    /// Compute part i of M of the runs and write the results to DIR for turncal merge
     #[arg(long, value_name = "i/M", value_parser = shard, requires = "output", conflicts_with = "json", help_heading = "Advanced")]
     shard: Option<Shard>,
 }
 
 impl Sharding {
-    /// Runs the requested part of a study, unless its results already exist; returns false if the whole study is requested.
+    /// Runs the requested part of a study unless its results already exist; returns false if the whole study was
+    /// requested.
     pub fn make<S: Study<Trial: Serialize> + Serialize>(
         self,
         job: JobKind,

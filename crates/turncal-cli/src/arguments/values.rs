@@ -1,4 +1,4 @@
-//! Value ranges of arguments.
+//! Allowed ranges of argument values.
 
 use std::time::Duration;
 

@@ -10,11 +10,11 @@ use turncal::calibration::ErrorTerm;
 /// A value of `--with`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum With {
-    /// Every error term, averaged over its absence and its usual sizes.
+    /// Every error term, averaged over being absent and having its usual sizes.
     Auto,
     /// K, E and D alone.
     None,
-    /// This term, whatever the data indicate.
+    /// This term, estimated regardless of the data.
     Term(ErrorTerm),
 }
 
@@ -34,7 +34,7 @@ impl With {
         }
     }
 
-    /// The terms given by name.
+    /// The terms that were given by name.
     pub fn terms(all: &[Self]) -> impl Iterator<Item = ErrorTerm> {
         all.iter().filter_map(|of| of.term())
     }
@@ -62,7 +62,8 @@ impl With {
         clap::Error::raw(ErrorKind::ArgumentConflict, message).exit();
     }
 
-    /// Writes the values by name. Auto is an empty list, as without `--with`, because both describe the same job.
+    /// Writes the names of the values. For `auto`, the list is empty, as without `--with`, because both describe the
+    /// same job.
     pub fn names<S: Serializer>(all: &[Self], serializer: S) -> Result<S::Ok, S::Error> {
         let stated = all.iter().filter(|of| **of != Self::Auto);
         serializer.collect_seq(stated.map(|of| of.name()))
@@ -73,7 +74,7 @@ impl With {
 pub fn with_value() -> impl TypedValueParser<Value = With> {
     let words = [
         PossibleValue::new("auto")
-            .help("Every error term, as an average over its absence and its usual sizes"),
+            .help("Every error term, averaged over being absent and having its usual sizes"),
         PossibleValue::new("none").help("K, E and D alone"),
     ];
     let values = words.into_iter().chain(ErrorTerm::ALL.map(listed));

@@ -1,4 +1,4 @@
-//! A file of kept rows to which new rows are added.
+//! A file of saved rows to which new rows are added.
 
 use std::fs::File;
 use std::io::{self, ErrorKind, Read, Seek, SeekFrom};
@@ -15,7 +15,7 @@ const LOOK: u64 = 1 << 16;
 pub struct Continued {
     log: PathBuf,
     pub kind: RowKind,
-    /// Length of the file without an incomplete last line.
+    /// Length of the file up to its last complete line.
     pub length: u64,
     /// The first lines.
     head: Vec<Vec<u8>>,
@@ -25,7 +25,7 @@ impl Continued {
     /// The file, unless it is empty or missing.
     ///
     /// # Errors
-    /// If it cannot be read, or if its last line is not a row of numbers.
+    /// Returns an error if the file cannot be read, or if its last line is not a row of numbers.
     pub fn of(log: &Path) -> anyhow::Result<Option<Self>> {
         let mut file = match File::open(log) {
             Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),

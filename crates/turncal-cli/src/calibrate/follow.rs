@@ -1,4 +1,4 @@
-//! `turncal calibrate --follow`: evaluates rows as they arrive, until they suffice or no more rows arrive.
+//! `turncal calibrate --follow`: evaluates rows as they arrive, until the accuracy suffices or no more rows arrive.
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -26,16 +26,16 @@ const APART: Duration = Duration::from_millis(500);
 
 /// Rows to follow.
 pub struct Follow<'a> {
-    /// A growing file, `-` or a device.
+    /// A growing file, `-` for standard input, or a device.
     pub source: &'a Path,
     pub of_log: &'a OfLog,
-    /// The run.toml of the rows; rows of a pipe or a device are saved in the log file given there.
+    /// The run.toml that describes the rows; rows from a pipe or a device are saved in the log file that it names.
     pub run: Option<&'a Path>,
     pub options: Options,
     pub specification: Option<Specification>,
-    /// File in which the rows of a pipe or a device are saved.
+    /// File in which rows from a pipe or a device are saved.
     pub keep: Option<&'a Path>,
-    /// Time without growth after which a file is complete.
+    /// Time without growth after which a file counts as complete.
     pub patience: Duration,
     /// Whether standard output is reserved for the result.
     pub silent: bool,
@@ -78,7 +78,7 @@ impl Follow<'_> {
             followed.evaluate(rows.received.bytes, &mut screen)?;
         }
         tell!(
-            "stopped following: {end}; the rows are in {}",
+            "stopped following because {end}; the rows are in {}",
             rows.log.display()
         );
         if let Some(text) = rows.left_out() {
@@ -97,8 +97,8 @@ impl Follow<'_> {
             && log.metadata().is_ok_and(|of| of.len() > 0)
         {
             bail!(
-                "{}: found the existing file {} in [imu], expected a new file for the rows. Give a new file there, or \
-                 follow the existing file",
+                "{}: found the existing file {} in [imu], expected a new file for the rows. Give the name of a new \
+                 file in [imu], or follow the existing file",
                 run.display(),
                 log.display()
             );

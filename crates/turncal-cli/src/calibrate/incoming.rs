@@ -1,4 +1,4 @@
-//! Rows that arrive while a log is followed, from a growing file, a pipe or a device.
+//! Rows that arrive while a log is followed; they come from a growing file, a pipe or a device.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, Read, Seek, SeekFrom, Write};
@@ -15,7 +15,7 @@ use super::lines::Lines;
 /// Interval between attempts to reopen a device that disappeared.
 const AGAIN: Duration = Duration::from_secs(1);
 
-/// Incoming rows, and the log that contains them.
+/// The incoming rows, and the log that contains them.
 pub struct Incoming {
     pub log: PathBuf,
     pub received: Received,
@@ -37,7 +37,7 @@ enum Kind {
 }
 
 impl Incoming {
-    /// Rows of a growing file. The file is complete when it has not grown for this time.
+    /// Rows of a growing file. The file counts as complete when it has not grown for this time.
     pub fn growing(log: &Path, patience: Duration) -> Self {
         let grew = Instant::now();
         Self {
@@ -47,7 +47,7 @@ impl Incoming {
         }
     }
 
-    /// Rows from standard input (`-`) or a device, appended to a file of rows of the same kind.
+    /// Rows from standard input (`-`) or a device, which are appended to a file with rows of the same kind.
     pub fn kept(source: &Path, log: PathBuf) -> anyhow::Result<Self> {
         if source != Path::new("-") {
             let there = source.metadata();
@@ -71,7 +71,7 @@ impl Incoming {
         })
     }
 
-    /// Waits for bytes; false at the end.
+    /// Waits for bytes; returns false at the end of the source.
     pub fn wait(&mut self, most: Duration) -> anyhow::Result<bool> {
         match &mut self.kind {
             Kind::Growing { grew, patience } => {
@@ -107,7 +107,7 @@ impl Incoming {
         }
     }
 
-    /// Keeps the last line, complete or not.
+    /// Keeps the last line, whether or not it is complete.
     pub fn end(&mut self) -> anyhow::Result<()> {
         match &mut self.kind {
             Kind::Growing { .. } => Ok(()),
@@ -125,7 +125,7 @@ impl Incoming {
             if let Some(length) = cut.take() {
                 let log = self.log.display();
                 file.set_len(length).with_context(|| log.to_string())?;
-                tell!("{log}: removed the last line, which is incomplete");
+                tell!("{log}: removed the last line because it is incomplete");
             }
             let written = file.write_all(bytes);
             written.with_context(|| self.log.display().to_string())?;
@@ -134,7 +134,7 @@ impl Incoming {
         Ok(())
     }
 
-    /// Number of lines that were not kept, and the first reasons; `None` if there are none.
+    /// Number of lines that were not kept, with the reasons for the first of them; `None` if all lines were kept.
     pub fn left_out(&self) -> Option<String> {
         match &self.kind {
             Kind::Growing { .. } => None,
@@ -199,7 +199,7 @@ fn read_in_background(source: PathBuf) -> anyhow::Result<Receiver<Option<Vec<u8>
                     return;
                 }
                 tell!(
-                    "{}: gone; waiting for it to return (Ctrl-C stops)",
+                    "{} has disappeared; waiting for its return (press Ctrl-C to stop)",
                     source.display()
                 );
             }

@@ -1,4 +1,4 @@
-//! Lines of a pipe or a device as they arrive, without those that are not rows of the log.
+//! Lines that arrive from a pipe or a device, without those that are not rows of the log.
 
 use std::mem;
 
@@ -15,9 +15,9 @@ const MOST_HELD: usize = 64;
 const MOST_NAMED: usize = 5;
 
 /// Reason for omitting the first line of a device.
-const CUT: &str = "perhaps only the end of a row";
+const CUT: &str = "the first line may be only the end of a row";
 
-/// Holds back the first lines until several rows are alike; from then on, keeps only rows of that kind.
+/// Holds back the first lines until several rows have the same layout; from then on, keeps only rows with this layout.
 #[derive(Default)]
 pub struct Lines {
     begin_anywhere: bool,
@@ -33,16 +33,16 @@ pub struct Lines {
     pub left_out: LeftOut,
 }
 
-/// Lines that are not kept.
+/// Lines that are left out.
 #[derive(Default)]
 pub struct LeftOut {
     pub count: usize,
-    /// Number in the order of arrival and reason of the first ones.
+    /// The first lines that are left out, each with its number in the order of arrival and the reason.
     pub named: Vec<String>,
 }
 
 impl LeftOut {
-    /// Number of lines and the first reasons; `None` if there are none.
+    /// Number of lines that are left out, with the reasons for the first ones; `None` if no line is left out.
     pub fn text(&self) -> Option<String> {
         let mut named = self.named.join("; ");
         if self.count > self.named.len() {
@@ -60,7 +60,7 @@ impl LeftOut {
 }
 
 impl Lines {
-    /// A device that does not wait for a reader may begin within a row.
+    /// The first line from a device that does not wait for a reader may be incomplete.
     pub fn new(begin_anywhere: bool, continued: Option<Continued>) -> Self {
         Self {
             begin_anywhere,
@@ -70,10 +70,10 @@ impl Lines {
         }
     }
 
-    /// Adds bytes; returns those to keep.
+    /// Adds bytes; returns the bytes to keep.
     ///
     /// # Errors
-    /// If the rows do not continue those of the file.
+    /// Returns an error if the rows do not continue those of the file.
     pub fn push(&mut self, bytes: &[u8]) -> anyhow::Result<Vec<u8>> {
         let mut kept = Vec::new();
         for part in bytes.split_inclusive(|byte| *byte == b'\n') {
@@ -86,7 +86,7 @@ impl Lines {
         Ok(kept)
     }
 
-    /// The device is gone: its last row is incomplete.
+    /// Must be called when the device has disappeared, because its last row is then incomplete.
     pub fn interrupt(&mut self) {
         self.is_cut = self.begin_anywhere;
         if !self.pending.is_empty() {
@@ -99,7 +99,7 @@ impl Lines {
     /// The remaining bytes to keep.
     ///
     /// # Errors
-    /// If the rows do not continue those of the file.
+    /// Returns an error if the rows do not continue those of the file.
     pub fn end(&mut self) -> anyhow::Result<Vec<u8>> {
         let mut rest = Vec::new();
         if !self.pending.is_empty() {

@@ -132,7 +132,7 @@ impl Calibrate {
     }
 }
 
-/// Opens the directory of a lot, and prints a note if another process must finish first.
+/// Opens the directory of a lot; prints a note if it has to wait for another process.
 pub fn open_directory(
     target: &Path,
     part: &Part,
@@ -204,7 +204,7 @@ fn unit_names(runs: &[PathBuf]) -> anyhow::Result<Vec<String>> {
     }
     let twice = (0..full.len()).find(|&k| full[..k].contains(&full[k]));
     let twice = twice.map_or_else(String::new, |k| runs[k].display().to_string());
-    bail!("{twice}: found this run twice, expected each unit once. Remove one")
+    bail!("{twice}: found this run twice, expected each unit only once. Remove one")
 }
 
 #[cfg(test)]

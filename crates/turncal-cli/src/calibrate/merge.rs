@@ -13,10 +13,11 @@ use turncal_files::{JobKind, Part, Parts, read_part_unit};
 use turncal_report as report;
 use turncal_report::Document;
 
-/// Merges the parts of a sharded job; the result is identical to a single run
+/// Merges the parts of a sharded job; the result is identical to that of a single run
 ///
-/// Parts are directories of a lot or a study, written with --shard. Their order, their number and the machines do not
-/// matter; missing or duplicate runs and parts of a different job are refused.
+/// A part is a directory of a lot or a study that was written with --shard. The number of parts, their order and the
+/// machines that computed them do not affect the result. The command refuses missing or duplicate runs, and parts of a
+/// different job.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:
   turncal study accuracy --runs 500 --shard 1/2 -o part-1

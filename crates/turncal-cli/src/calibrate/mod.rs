@@ -47,19 +47,21 @@ const FOLLOWING: &str = "Following a log";
 
 /// Estimates scale factors, misalignments and biases from a run
 ///
-/// Writes DIR/calibration.json and DIR/report/, and prints a summary. Exit status: 0 if the values may be used, 1 if
-/// they must not (FAILED), 3 if --require or a specification is not met.
+/// Writes DIR/calibration.json and DIR/report/, and prints a summary. Exit status: 0 if the values may be used; 1 if
+/// they must not be used (verdict FAILED); 3 if --require or a specification is not met.
 ///
-/// With --temperature, parameters depend on the temperature column; for a recording in one attitude, only biases do.
+/// With --temperature, the parameters depend on the temperature column; if the recording has only one attitude, only
+/// the biases do.
 ///
-/// A campaign.toml lists several recordings of one instrument. They are calibrated jointly: parameters may depend on
-/// temperature and differ from day to day.
+/// A campaign.toml lists several recordings of one instrument. These recordings are calibrated jointly: the parameters
+/// may depend on temperature and differ from day to day.
 ///
-/// Several logs, in each of which a sensor lies still in one position, are one recording of that sensor.
+/// If a sensor lies still in a different position in each of several logs, these logs are treated as one recording.
 ///
-/// Several run.toml (or, with --lot, logs) are the units of a lot: each is calibrated into DIR/units/NAME/, and DIR/lot.json, lot.csv and
-/// index.html summarise the lot. Units that fail are listed with the reason; the command then fails after writing
-/// everything. The same command, run again, processes only missing or changed units.
+/// Several run.toml files (or, with --lot, logs) are the units of a lot. turncal writes the calibration of each unit
+/// into DIR/units/NAME/ and a summary of the lot into DIR/lot.json, lot.csv and index.html. The lot lists units that
+/// could not be calibrated, with the reason; the command then fails, but only after all results are written. If you run
+/// the same command again, it calibrates only units that are missing or have changed.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal calibrate imu.csv --latitude 48.1 --sensor bmi088
@@ -77,52 +79,54 @@ const FOLLOWING: &str = "Following a log";
   turncal calibrate --follow imu.csv --specification mems-by-hand
   turncal calibrate lot/*/run.toml --shard 3/8 -o part-3")]
 pub struct Calibrate {
-    /// A run.toml, a log, or - for text on standard input; several logs of a sensor that lies still are one recording,
-    /// other runs are units of a lot; a campaign.toml lists recordings of one instrument
+    /// A run.toml, a log, or - for text on standard input; several logs of a sensor that lies still count as one
+    /// recording, and other runs are units of a lot; a campaign.toml lists recordings of one instrument
     #[arg(required = true, value_name = "RUN.toml|LOG", value_parser = run_or_log)]
     runs: Vec<PathBuf>,
     #[command(flatten)]
     of_log: OfLog,
-    /// Output directory [default: NAME-calibration, NAME-calibration-six-position for that method, lot-calibration for
+    /// Output directory [default: NAME-calibration; NAME-calibration-six-position for this method; lot-calibration for
     /// a lot; none with --json]
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
     #[command(flatten)]
     estimation: Estimation,
-    /// Let parameters depend on the temperature column of the run (the default for campaigns with known temperature)
+    /// Let parameters depend on the temperature column of the run (the default for campaigns whose temperatures are
+    /// known)
     #[arg(long, conflicts_with_all = ["specification", "shard"])]
     temperature: bool,
-    /// True calibration, not used by the estimator; summary and report then show the errors
+    /// True parameters of the instrument; the estimator does not use them, but the summary and the report show the
+    /// errors
     #[arg(long, value_name = "FILE")]
     truth: Option<PathBuf>,
-    /// Parameters that must be determined; otherwise the exit status is 3
+    /// Parameters that must be determined; if one of them is not, the exit status is 3
     #[arg(long, value_name = "PARAMETERS", value_parser = one_of(&REQUIRED), value_delimiter = ',', conflicts_with_all = ["specification", "shard"])]
     require: Vec<&'static str>,
-    /// Take each run as a unit of a lot, also logs of a sensor that lies still
+    /// Treat each run as a unit of a lot, even if it is the log of a sensor that lies still
     #[arg(long, conflicts_with_all = ["follow", "truth", "temperature"])]
     lot: bool,
     /// Limits for the units of a lot (a specification.toml)
     #[arg(long, value_name = "FILE", conflicts_with = "truth")]
     specification: Option<PathBuf>,
-    /// Calibrate part i of M of a lot, for turncal merge
+    /// Calibrate part i of M of a lot; turncal merge combines the parts
     #[arg(long, value_name = "i/M", value_parser = shard, requires = "output", conflicts_with_all = ["json", "truth"], help_heading = "Advanced")]
     shard: Option<Shard>,
-    /// Follow a growing log, - or a serial device: show the accuracy so far and the next move, and calibrate when the
-    /// specification can be decided, no more rows arrive, or Ctrl-C is pressed
+    /// Follow a growing log, - or a serial device: show the current accuracy and the next move, and calibrate when the
+    /// specification can be decided, when no more rows arrive, or when Ctrl-C is pressed
     #[arg(long, conflicts_with_all = ["shard", "temperature", "truth"], help_heading = FOLLOWING)]
     follow: bool,
-    /// File in which rows from standard input (-) or a device are saved; an existing file must contain rows of the same
-    /// kind, and is continued [default: follow-TIME.csv]
+    /// File in which rows from standard input (-) or a device are saved; if the file exists, it must contain rows of
+    /// the same kind, and new rows are appended [default: follow-TIME.csv]
     #[arg(long, value_name = "FILE", requires = "follow", help_heading = FOLLOWING)]
     keep: Option<PathBuf>,
-    /// run.toml that describes the rows; rows from standard input (-) or a device are saved in the log file given
-    /// there, which must be new
+    /// run.toml that describes the rows; rows from standard input (-) or a device are saved in the log file named
+    /// there, which must not exist yet
     #[arg(long, value_name = "RUN.toml", requires = "follow", conflicts_with = "keep", value_parser = run_file, help_heading = FOLLOWING)]
     run: Option<PathBuf>,
-    /// Time without growth after which a followed file is complete, s
+    /// Time in s without growth after which a followed file counts as complete
     #[arg(long, value_name = "S", requires = "follow", value_parser = seconds, default_value = "30", help_heading = FOLLOWING)]
     patience: Duration,
-    /// Print the calibration, or the evaluation of the lot, as one JSON document and nothing else
+    /// Print the calibration, or the evaluation of the lot, as a single JSON document, without any other output
     #[arg(long)]
     json: bool,
     /// Print all parameters, tests and findings
@@ -167,13 +171,14 @@ impl Calibrate {
         let Some(opened) = self.of_log.open_positions(&self.runs)? else {
             drop(activity);
             tell!(
-                "note: the sensor is turned in these {count} logs, so they are taken as units of a lot (--lot)"
+                "note: the sensor was turned in these {count} logs, so turncal treats the logs as units of a lot \
+                 (--lot)"
             );
             return self.units();
         };
         tell!(
-            "note: the sensor lies still in each of these {count} logs, so they are taken as one recording of one \
-             sensor; for several sensors, add --lot"
+            "note: the sensor lies still in each of these {count} logs, so turncal treats the logs as one recording \
+             of one sensor; for several sensors, add --lot"
         );
         let runs: Vec<&Run> = opened.iter().map(|opened| &opened.run).collect();
         let together = Together {
@@ -190,9 +195,10 @@ impl Calibrate {
     /// The units of a lot.
     fn units(&self) -> anyhow::Result<()> {
         let message = if self.truth.is_some() {
-            "--truth applies to one run; to compare units of a lot with their truths, use turncal compare\n"
+            "--truth applies only to a single run; to compare the units of a lot with their true values, use turncal \
+             compare\n"
         } else if !self.require.is_empty() {
-            "--require applies to one run; for the units of a lot, give a --specification\n"
+            "--require applies only to a single run; for the units of a lot, use --specification\n"
         } else {
             return self.lot();
         };
@@ -202,7 +208,8 @@ impl Calibrate {
     /// Follows a log until it ends, then calibrates it.
     fn followed(&self) -> anyhow::Result<()> {
         let [source] = self.runs.as_slice() else {
-            let message = "--follow takes one log; calibrate several logs when they are complete\n";
+            let message =
+                "--follow accepts only one log; calibrate several logs when they are complete\n";
             clap::Error::raw(ErrorKind::ArgumentConflict, message).exit();
         };
         let specification = self.specification.as_deref().map(models::specification);
@@ -363,10 +370,12 @@ impl Calibrate {
         calibration: Calibration,
     ) -> anyhow::Result<()> {
         if !solution.converged() {
-            bail!("{name}: not converged; do not use the values or σ, see the findings");
+            bail!(
+                "{name}: the calibration did not converge; do not use the values or σ, and see the findings"
+            );
         }
         if !solution.is_usable() {
-            bail!("{name}: do not use the values, see the findings");
+            bail!("{name}: do not use the values; see the findings");
         }
         self.check_required(name, &calibration)?;
         self.decide(name, calibration)
@@ -448,7 +457,7 @@ fn say(recording: &Recording) {
     }
 }
 
-/// Solves a problem and shows the passes.
+/// Solves a calibration problem, and shows each pass while doing so.
 pub fn solve(problem: &Problem, method: Method, activity: &Activity) -> anyhow::Result<Solution> {
     let name = &problem.run().recording.name;
     activity.next(format!("calibrating {name}"));
@@ -473,7 +482,7 @@ pub fn read_truth(path: &Path, run: &Run, body_frame: BodyFrame) -> anyhow::Resu
         && *unit != run.instrument.unit
     {
         bail!(
-            "{}: the units are {} and {}, but the units of the run are {} and {}. Give the truth of this run",
+            "{}: the units are {} and {}, but the units of the run are {} and {}. Give the truth file of this run",
             path.display(),
             unit.gyro,
             unit.accel,

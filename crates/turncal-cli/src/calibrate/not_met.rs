@@ -1,4 +1,4 @@
-//! Requirements on a calibration that are not met.
+//! Error for a calibration that does not meet a requirement.
 
 /// The calibration succeeded, but a requirement is not met.
 #[derive(Debug, thiserror::Error)]

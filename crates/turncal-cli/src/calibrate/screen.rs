@@ -1,4 +1,4 @@
-//! The display while a log is followed.
+//! The display shown while a log is followed.
 
 use std::collections::BTreeSet;
 use std::io::{self, IsTerminal};
@@ -11,7 +11,7 @@ use turncal::survey::Status;
 use turncal_report::session;
 use turncal_report::terminal::{printable, wrapped};
 
-/// Output: a screen that is redrawn on a terminal, otherwise a line for each dwell.
+/// Form of the output: on a terminal, a screen that is redrawn; otherwise, one line for each dwell.
 pub struct Screen {
     is_terminal: bool,
     silent: bool,
@@ -78,7 +78,7 @@ impl Screen {
         Ok(())
     }
 
-    /// Reports once why the rows cannot be evaluated.
+    /// Reports, only once, why the rows cannot be evaluated.
     pub fn trouble(&mut self, text: &str) -> anyhow::Result<()> {
         if self.is_terminal && !self.silent {
             return self.draw(vec![
@@ -102,7 +102,7 @@ impl Screen {
         }
     }
 
-    /// Shows at once that lines arrive, before they are evaluated.
+    /// Shows immediately that lines arrive, even before they are evaluated.
     pub fn count(&mut self, received: usize, left_out: Option<String>) -> anyhow::Result<()> {
         if received == self.received && left_out == self.left_out {
             return Ok(());

@@ -11,9 +11,9 @@ use turncal_report::allan;
 
 /// Computes the Allan deviation of a stationary recording and its noise figures
 ///
-/// Shows the overlapping Allan deviation of every axis with its confidence interval; random walk, bias instability,
-/// rate random walk, quantisation and ramp with σ if detected, otherwise with an upper limit; and a table [imu.noise]
-/// for run.toml. Uses the whole recording if it is stationary, otherwise its longest static interval.
+/// Shows the overlapping Allan deviation of every axis with its confidence interval; the coefficients of random walk,
+/// bias instability, rate random walk, quantisation and ramp (with σ if detected, otherwise as an upper limit); and an
+/// [imu.noise] table for run.toml. Uses the whole recording if it is stationary, otherwise its longest static interval.
 #[derive(Debug, clap::Args)]
 #[command(mut_arg("output", |output| output.help("Directory for the report and figures")))]
 #[command(after_help = "Examples:
@@ -27,7 +27,7 @@ pub struct Allan {
     run: PathBuf,
     #[command(flatten)]
     of_log: OfLog,
-    /// Use the segment with this label (the longest if there are several)
+    /// Use the segment with this label (the longest one if several segments have this label)
     #[arg(long, value_name = "LABEL")]
     segment: Option<String>,
     #[command(flatten)]

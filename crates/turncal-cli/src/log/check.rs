@@ -7,11 +7,12 @@ use crate::terminal::Activity;
 use turncal::survey::Survey;
 use turncal_report::check;
 
-/// Describes a run and the parameters that each method could observe
+/// Describes a run and the parameters that each method could determine
 ///
-/// Does not calibrate. Shows rate, jitter, faults and resolution of the log; dwells with their upward axis; turns with
-/// axis and angle; labelled sections compared with both; the predicted σ of each method and the parameters that the
-/// method would not observe; recommended changes. Problems in the run do not change the exit status.
+/// Without calibrating, shows the rate, jitter, faults and resolution of the log; the dwells with their upward axis;
+/// the turns with their axis and angle; how labelled sections agree with dwells and turns; the σ predicted for each
+/// method and the parameters that the method could not determine; and recommended changes. Problems in the run do not
+/// change the exit status.
 #[derive(Debug, clap::Args)]
 #[command(mut_arg("output", |output| output.help("Directory for the report and a figure of the recording")))]
 #[command(after_help = "Examples:
@@ -39,8 +40,27 @@ impl Check {
         drop(activity);
         begun.deliver(&check::document(&run, &survey))?;
         if !self.delivery.json() {
-            tell!("\nnext: turncal calibrate {}", self.run.display());
+            tell!("\nnext: turncal calibrate {}", said_of_the_log().join(" "));
         }
         Ok(())
     }
+}
+
+/// The words of this command line that `calibrate` takes as well.
+fn said_of_the_log() -> Vec<String> {
+    let words = std::env::args().skip_while(|word| word != "check").skip(1);
+    let mut is_of_output = false;
+    let kept = words.filter(|word| {
+        let follows = std::mem::replace(&mut is_of_output, word == "-o" || word == "--output");
+        let is_output = word.starts_with("-o") || word.starts_with("--output") || word == "--force";
+        !follows && !is_output
+    });
+    let quoted = |word: String| {
+        if word.contains([' ', '\'', '"', '$', '*']) {
+            format!("'{}'", word.replace('\'', "'\\''"))
+        } else {
+            word
+        }
+    };
+    kept.map(quoted).collect()
 }

@@ -8,22 +8,22 @@ use turncal_files::draft::Draft;
 
 /// Converts the log of another program to a plain run directory
 ///
-/// The streams of the instrument become CSV files with every column and all digits, plus a draft of run.toml as written
-/// by `turncal init`. Reads MCAP, ROS bags, PX4 ULog, ArduPilot DataFlash, MATLAB and NumPy files; calibrate and check
-/// also read them directly.
+/// Writes the streams of the instrument as CSV files with every column and all digits, and a draft of run.toml like
+/// that of `turncal init`. Reads MCAP, ROS bags, PX4 ULog, ArduPilot DataFlash, MATLAB and NumPy files; calibrate and
+/// check can also read these files directly.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal convert flight.ulg -o my-run
   turncal convert drive.mcap --stream /imu/data -o my-run")]
 pub struct Convert {
-    /// Log file; its format is identified by its content
+    /// Log file; turncal detects its format from its content
     log: PathBuf,
-    /// Directory to write
+    /// Directory in which to write the output
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
     #[command(flatten)]
     of_log: OfLog,
-    /// Use the intact part before the first damage
+    /// Use the intact part of a damaged log, up to the first damage
     #[arg(long)]
     salvage: bool,
     #[command(flatten)]

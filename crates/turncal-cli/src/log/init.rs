@@ -8,11 +8,11 @@ use turncal_files::draft::Draft;
 use turncal_files::write_whole;
 use turncal_logs::DataFile;
 
-/// Drafts a run.toml for a log
+/// Drafts a run.toml from a log
 ///
-/// Identifies the columns by name or value, the time unit, the sensor units (from gravity at rest and its change when
-/// the gyros turn), and the white noise at rest, and gives a reason for each guess. Fields that the log cannot show are
-/// marked TODO.
+/// Identifies the columns (by name or value), the time unit, the sensor units (from gravity at rest and from the change
+/// of gravity direction during turns) and the white noise at rest, and gives a reason for each guess. Fields that
+/// cannot be determined from the log are marked TODO.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal init imu.csv
@@ -20,11 +20,12 @@ use turncal_logs::DataFile;
   turncal init flight.ulg
   turncal init Gyroscope.csv Accelerometer.csv")]
 pub struct Init {
-    /// Rows of numbers with or without a line of names (`.csv`, `.txt`, `.tsv`, `.dat` or `.log`, also `.gz`); or MCAP,
-    /// a ROS bag, PX4 ULog, ArduPilot DataFlash, MAT, NPY or NPZ (init lists their streams)
+    /// Log: a text file of numbers with or without a line of column names (`.csv`, `.txt`, `.tsv`, `.dat` or `.log`,
+    /// also compressed as `.gz`); or an MCAP, ROS bag, PX4 ULog, ArduPilot DataFlash, MAT, NPY or NPZ file, whose
+    /// streams init lists
     #[arg(value_name = "IMU.csv")]
     log: PathBuf,
-    /// Log of the accelerometers, as with --accel-file
+    /// Log of the accelerometers (the same as --accel-file)
     #[arg(value_name = "ACCEL.csv", conflicts_with_all = ["stream", "accel_file"])]
     accel: Option<PathBuf>,
     #[command(flatten)]

@@ -5,11 +5,11 @@ use crate::terminal::show;
 use turncal::noise::conventions::{convert, known};
 use turncal_report::conversion;
 
-/// Converts a noise figure to every convention: data sheets, Kalibr, PSINS, KF-GINS
+/// Converts a noise figure to all conventions: data sheets, Kalibr, PSINS, KF-GINS
 ///
-/// Each line gives the convention and its users. Densities are two-sided, as in IEEE Std 952; a one-sided density is √2
-/// times as large. A unit of rate or acceleration (deg/s, m/s^2) means noise per sample with --rate, and bias
-/// instability without.
+/// Each output line gives a convention and the data sheets or programs that use it. Densities are two-sided, as in IEEE
+/// Std 952; a one-sided density is √2 times as large. With --rate, a unit of rate or acceleration (deg/s, m/s^2) means
+/// noise per sample; without --rate, it means bias instability.
 #[derive(Debug, clap::Args)]
 #[command(after_help = format!("Examples:
   turncal noise 0.3 'deg/sqrt(h)'
@@ -21,13 +21,13 @@ pub struct Noise {
     /// Noise figure to convert
     #[arg(value_name = "VALUE", allow_negative_numbers = true, value_parser = positive)]
     value: f64,
-    /// Unit, or the name of the figure in a program
+    /// Unit of the figure, or its name in a program
     #[arg(value_name = "UNIT")]
     unit: String,
-    /// Sample rate in Hz, for noise per sample
+    /// Sample rate in Hz, to convert noise per sample
     #[arg(long, value_name = "HZ", allow_negative_numbers = true, value_parser = positive)]
     rate: Option<f64>,
-    /// Print the results as one JSON document and nothing else
+    /// Print the results as a single JSON document, without any other output
     #[arg(long)]
     json: bool,
 }

@@ -23,10 +23,11 @@ const SUSPECT_SIGMAS: f64 = 10.0;
 /// Converts the raw samples of a run to angular rate and specific force
 ///
 /// Writes one row per sample: start and end in s, angular rate in rad/s and specific force in m/s², both averaged over
-/// the sample, along right, front and up in the body frame of the calibration. Error terms of the calibration are also
-/// corrected, and so is temperature dependence if the run has a temperature; the correction of the time offset neglects
-/// Earth rate. The name of the last column is the verdict of the calibration, such as verdict_good; the column contains
-/// 1. The output can itself be the log of a run.toml: output = "rate", time_stamp = "end".
+/// the sample, along the right, forward and up axes of the body frame of the calibration. Also corrects the data for
+/// the error terms of the calibration and, if the run contains temperatures, for the temperature dependence. The
+/// correction for the time offset neglects Earth rate. The name of the last column states the verdict of the
+/// calibration, for example verdict_good; the column contains 1 in every row. You can use the output as the log of
+/// another run.toml with output = "rate" and time_stamp = "end".
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal apply result/calibration.json run.toml -o calibrated.csv.gz
@@ -43,11 +44,11 @@ pub struct Apply {
     /// File to write, `.csv` or `.csv.gz` [default: standard output]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Interpolate missing rows and mark them with 1 in a column `filled`, except in gaps too long for calibrate to
-    /// bridge
+    /// Interpolate missing rows and mark them with 1 in a column `filled`; gaps that are too long for calibrate to
+    /// bridge are not filled
     #[arg(long)]
     fill: bool,
-    /// Replace the output file if it exists, and apply a calibration even if its verdict is FAILED
+    /// Replace an existing output file, and apply a calibration even if its verdict is FAILED
     #[arg(long)]
     force: bool,
 }
@@ -63,7 +64,7 @@ impl Apply {
         let lost: usize = run.recording.imu.lost().iter().map(Range::len).sum();
         if let Some(missing) = run.recording.imu.missing().next().filter(|_| self.fill) {
             bail!(
-                "{}: {} rows are missing from {:.3} s on, too many to fill. Omit --fill, or split the log there",
+                "{}: {} rows are missing from {:.3} s on, which is too many to interpolate. Omit --fill, or split the log at this gap",
                 self.run.display(),
                 missing.len(),
                 run.recording.imu.time(missing.start)
@@ -132,7 +133,8 @@ fn notes(record: &Calibration, correction: &Correction, run: &Run) -> Vec<String
     }
     if record.unit.is_none() {
         notes.push(
-            "the calibration states no units, so turncal assumed the units of the run".to_owned(),
+            "the calibration does not state units, so turncal assumed the units of the run"
+                .to_owned(),
         );
     }
     for sensor in Sensor::ALL {
@@ -145,8 +147,8 @@ fn notes(record: &Calibration, correction: &Correction, run: &Run) -> Vec<String
             .component_div(&run.instrument.prior.get(sensor).scale_sigma);
         if sigmas.max() > SUSPECT_SIGMAS {
             notes.push(format!(
-                "{} scale factors differ by up to {:.0} ppm from the nominal values of the run, {:.0} times the 1σ \
-                 in [imu.prior.{0}]. Check that this calibration belongs to this instrument",
+                "{} scale factors differ from the nominal values of the run by up to {:.0} ppm, which is {:.0} times \
+                 the 1σ in [imu.prior.{0}]. Check that this calibration belongs to this instrument",
                 sensor.name(),
                 off.amax() / PPM,
                 sigmas.max()
@@ -157,12 +159,14 @@ fn notes(record: &Calibration, correction: &Correction, run: &Run) -> Vec<String
         notes.extend(of_temperature(thermal, run));
     }
     if correction.has(Term::TimeOffset) {
-        notes
-            .push("the correction of the accelerometer time offset neglects Earth rate".to_owned());
+        notes.push(
+            "the correction for the accelerometer time offset neglects Earth rate".to_owned(),
+        );
     }
     if correction.has(Term::SizeEffect) && !run.recording.imu.continuous {
         notes.push(
-            "the recording is not continuous, so the size effect is corrected without its angular-acceleration part"
+            "the recording is not continuous, so the part of the size effect that depends on angular acceleration is \
+             not corrected"
                 .to_owned(),
         );
     }
@@ -173,8 +177,8 @@ fn notes(record: &Calibration, correction: &Correction, run: &Run) -> Vec<String
 fn of_temperature(thermal: &ThermalRecord, run: &Run) -> Vec<String> {
     let Some(temperature) = &run.recording.imu.temperature else {
         return vec![format!(
-            "the calibration depends on temperature, but the run has none: all rows are corrected for {} °C and have \
-             0 in in_range",
+            "the calibration depends on temperature, but the run has none: all rows are corrected for {} °C, and their \
+             column in_range is 0",
             thermal.range.gyro.reference
         )];
     };
@@ -184,8 +188,8 @@ fn of_temperature(thermal: &ThermalRecord, run: &Run) -> Vec<String> {
             || highest > range.highest + TEMPERATURE_TOLERANCE;
         is_beyond.then(|| {
             format!(
-                "{}: the run covers {lowest:.1} to {highest:.1} °C, but the calibration is valid for {:.1} to {:.1} \
-                 °C; rows outside have 0 in in_range",
+                "{}: the temperatures of the run are {lowest:.1} to {highest:.1} °C, but the calibration is valid \
+                 only from {:.1} to {:.1} °C; in rows outside this range, the column in_range is 0",
                 sensor.name(),
                 range.lowest,
                 range.highest

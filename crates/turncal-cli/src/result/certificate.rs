@@ -14,12 +14,12 @@ use turncal_report::certificate::{Certificate as Content, Conformity, Decision};
 
 /// Writes a calibration certificate as PDF/A-3 with an embedded Digital Calibration Certificate
 ///
-/// DIR/certificate.pdf contains the fields that ISO/IEC 17025 requires of a certificate, from calibration.json and
-/// lab.toml. dcc.xml (PTB DCC 3.3.0, with D-SI units and the covariance matrix) and calibration.json are embedded in it
-/// and also written to DIR. Missing required fields are listed. All dates come from lab.toml, so the same input gives
-/// the same bytes. The certificate claims no accreditation.
+/// DIR/certificate.pdf contains the fields that ISO/IEC 17025 requires in a certificate, taken from calibration.json
+/// and lab.toml. The PDF embeds dcc.xml (PTB DCC 3.3.0, with D-SI units and the covariance matrix) and
+/// calibration.json; both are also written to DIR. If required fields are missing, the command lists them. All dates
+/// come from lab.toml, so the same input always gives identical files. The certificate claims no accreditation.
 ///
-/// For a draft of lab.toml, run turncal certificate --draft
+/// To draft a lab.toml, run turncal certificate --draft
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal certificate --draft > lab.toml
@@ -34,16 +34,16 @@ pub struct Certificate {
     /// Laboratory data
     #[arg(long, value_name = "lab.toml", required_unless_present = "draft")]
     laboratory: Option<PathBuf>,
-    /// Limits for the parameters, applied with the decision rule in lab.toml
+    /// Limits for the parameters, checked with the decision rule in lab.toml
     #[arg(long, value_name = "specification.toml")]
     specification: Option<PathBuf>,
-    /// Earlier calibration, valid when the item was received
+    /// Earlier calibration that was valid when the item was received
     #[arg(long, value_name = "EARLIER.json")]
     as_found: Option<PathBuf>,
-    /// Directory to write
+    /// Directory in which to write the output
     #[arg(short, long, value_name = "DIR", default_value = "certificate")]
     output: PathBuf,
-    /// Print a lab.toml to complete, and nothing else
+    /// Print only a lab.toml for you to complete
     #[arg(long, exclusive = true)]
     draft: bool,
     #[command(flatten)]

@@ -1,4 +1,4 @@
-//! `turncal compare`: calibrations side by side.
+//! `turncal compare`: comparison of calibrations.
 
 use std::path::{Path, PathBuf};
 
@@ -12,20 +12,20 @@ use turncal_report as report;
 
 /// Compares calibrations, parameter by parameter, with their σ
 ///
-/// All calibrations are first converted to the general misalignment form and one body frame. Differences are from the
-/// truth or, for two calibrations without a truth, from the first. For three or more, the mean, scatter and χ² of the
-/// scatter relative to the stated σ are also shown, and outliers are marked. A calibration whose verdict is FAILED is
-/// refused without --force.
+/// turncal first converts all calibrations to the general misalignment form and one body frame. Differences are
+/// relative to the truth or, for two calibrations without a truth, to the first one. With three or more calibrations,
+/// turncal also shows the mean, the scatter, and the χ² of the scatter relative to the stated σ, and marks outliers.
+/// Without --force, turncal refuses a calibration whose verdict is FAILED.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  turncal compare monday.json friday.json --truth truth.json")]
 pub struct Compare {
     /// Two or more calibrations (one is enough with --truth)
     #[arg(required = true, value_name = "CALIBRATION.json")]
     calibrations: Vec<PathBuf>,
-    /// True values, if known
+    /// True parameters, if known
     #[arg(long, value_name = "FILE")]
     truth: Option<PathBuf>,
-    /// Temperature of the comparison, °C [default: reference temperature of each calibration]
+    /// Temperature at which to compare the calibrations, °C [default: reference temperature of each calibration]
     #[arg(long, value_name = "T", allow_negative_numbers = true)]
     temperature_degc: Option<f64>,
     #[command(flatten)]
@@ -35,7 +35,8 @@ pub struct Compare {
 impl Compare {
     pub fn run(&self) -> anyhow::Result<()> {
         if self.calibrations.len() == 1 && self.truth.is_none() {
-            let message = "one calibration can be compared only with a truth; give --truth or a second calibration\n";
+            let message = "a single calibration can be compared only with a truth; give --truth or a second \
+            calibration\n";
             clap::Error::raw(ErrorKind::TooFewValues, message).exit();
         }
         let paths = self.truth.iter().chain(&self.calibrations);

@@ -35,9 +35,11 @@ impl Explain {
         };
         let verdict = match kind.level() {
             Level::Failed => "The verdict is then FAILED.",
-            Level::Partial => "The verdict is then PARTIAL, or as the finding says.",
+            Level::Partial => {
+                "The verdict is then PARTIAL, unless the finding itself states another level."
+            }
             Level::Care => {
-                "The verdict is then USE WITH CARE, unless the finding hardly changes the result."
+                "The verdict is then USE WITH CARE, unless the problem hardly affects the result."
             }
             Level::Note => "The verdict is not affected.",
         };

@@ -12,10 +12,11 @@ use turncal_files::write_whole;
 
 /// Exports a calibration for other programs (Kalibr, PX4, ROS, C, …)
 ///
-/// Formats with inputs in rad/s and m/s² state the divisor of the raw output: the nominal scale of the unit; for
-/// counts, the nominal scale of --run, otherwise the calibrated scale factors rounded to three digits. The verdict of
-/// the calibration and the parts that the format cannot represent are stated in the file and on standard error (for
-/// realsense, which has no place for text, only on standard error).
+/// For formats whose inputs are in rad/s and m/s², the file states the number by which to divide the raw output. This
+/// number is the nominal scale of the unit; for counts, it is the nominal scale of --run or, without --run, the
+/// calibrated scale factor rounded to three digits. The verdict of the calibration, and the parts of it that the format
+/// cannot represent, are stated in the file and on standard error (for realsense, which has no place for text, only on
+/// standard error).
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal export result/calibration.json --format c -o imu.h
@@ -29,17 +30,17 @@ pub struct Export {
     /// Format to write
     #[arg(long, value_parser = export_format())]
     format: export::Format,
-    /// Run of the same instrument, for noise figures, sample rate and nominal scales
+    /// Run of the same instrument that supplies noise figures, sample rate and nominal scales
     #[arg(long, value_name = "RUN.toml", value_parser = run_file)]
     run: Option<PathBuf>,
-    /// Calibration temperature, °C [default: reference temperature; c, px4 and ardupilot contain the temperature
-    /// dependence]
+    /// Temperature for which to export the calibration, °C [default: reference temperature; c, px4 and ardupilot
+    /// contain the temperature dependence]
     #[arg(long, value_name = "T", allow_negative_numbers = true)]
     temperature_degc: Option<f64>,
     /// File to write [default: standard output]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Replace the output file if it exists, and export a calibration even if its verdict is FAILED
+    /// Replace an existing output file, and export a calibration even if its verdict is FAILED
     #[arg(long)]
     force: bool,
 }

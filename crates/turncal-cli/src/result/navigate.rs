@@ -17,12 +17,12 @@ const HOUR: f64 = 3600.0;
 /// Largest pitch at which roll and heading are distinguishable, degrees.
 const LARGEST_PITCH: f64 = 89.0;
 
-/// Shows the navigation error due to the errors of a calibration
+/// Shows the navigation error caused by the errors of a calibration
 ///
-/// Navigates with the instrument of --truth, corrected by the calibration, from perfect alignment and with the height
-/// fixed to the true height, at rest or along a trajectory. Shows the errors of attitude, velocity and position, and
-/// their σ predicted from the covariance of the calibration. A calibration whose verdict is FAILED is refused without
-/// --force.
+/// Simulates navigation at rest or along a trajectory with the instrument of --truth, whose output is corrected with
+/// the calibration. Navigation starts with perfect alignment, and the height is held at the true height. Shows the
+/// errors of attitude, velocity and position, and the σ of these errors predicted from the covariance of the
+/// calibration. Without --force, turncal refuses a calibration whose verdict is FAILED.
 #[derive(Debug, clap::Args)]
 #[command(mut_arg("output", |output| output.help("Directory for navigation.csv, figures and a page")))]
 #[command(after_help = "Examples:
@@ -33,13 +33,13 @@ const LARGEST_PITCH: f64 = 89.0;
   turncal navigate monday.json --truth friday.json \\
       --latitude-deg -33.9 --errors gyro --json")]
 pub struct Navigate {
-    /// The calibration that navigation uses
+    /// Calibration with which the sensor data are corrected
     #[arg(value_name = "CALIBRATION.json")]
     calibration: PathBuf,
-    /// The true parameters of the instrument: a truth.json or another calibration
+    /// True parameters of the instrument: a truth.json or another calibration
     #[arg(long, value_name = "FILE")]
     truth: PathBuf,
-    /// Latitude in degrees, north positive [default: from the trajectory, otherwise from the calibration]
+    /// Latitude in degrees, north positive [default: latitude of the trajectory or, at rest, of the calibration]
     #[arg(
         long,
         alias = "latitude",
@@ -48,8 +48,8 @@ pub struct Navigate {
         value_parser = latitude
     )]
     latitude_deg: Option<f64>,
-    /// Height above the ellipsoid in metres [default: 0, or the height of the trajectory; the whole trajectory shifts
-    /// to it]
+    /// Height above the ellipsoid in metres [default: 0, or the height of the trajectory; if given, the whole
+    /// trajectory is shifted to this height]
     #[arg(long, value_name = "H", allow_negative_numbers = true, value_parser = height)]
     height_m: Option<f64>,
     /// Attitude at rest, in degrees
@@ -68,10 +68,10 @@ pub struct Navigate {
     /// Duration in hours (whole minutes, up to 1000)
     #[arg(long, default_value_t = 40.0, allow_negative_numbers = true, value_parser = hours)]
     hours: f64,
-    /// Trajectory to follow instead of rest: a TOML file or an embedded name (flight, vehicle)
+    /// Trajectory to follow, instead of being at rest: a TOML file or an embedded name (flight, vehicle)
     #[arg(long, value_name = "FILE.toml")]
     trajectory: Option<String>,
-    /// Temperature, °C [default: reference temperature of each calibration]
+    /// Temperature at which to evaluate the calibrations, °C [default: reference temperature of each calibration]
     #[arg(long, value_name = "T", allow_negative_numbers = true)]
     temperature_degc: Option<f64>,
     #[command(flatten)]
@@ -86,9 +86,9 @@ struct Attitude([f64; 3]);
 enum Errors {
     /// Both triads
     Both,
-    /// The gyros; the accelerometers are exact
+    /// Only gyro errors; the accelerometers are exact
     Gyro,
-    /// The accelerometers; the gyros are exact
+    /// Only accelerometer errors; the gyros are exact
     Accel,
 }
 
@@ -159,7 +159,7 @@ impl Navigate {
         let of_run = calibration.provenance.as_ref();
         let of_run = of_run.and_then(|of| Some(of.latitude_deg? * DEGREE));
         let Some(latitude) = latitude.or(of_run) else {
-            bail!("no latitude: give --latitude-deg, or --trajectory");
+            bail!("the latitude is unknown: give --latitude-deg, or --trajectory");
         };
         let attitude = self.attitude_deg.0.map(|angle| angle * DEGREE);
         let height = self.height_m.unwrap_or(0.0);
@@ -175,7 +175,7 @@ fn attitude(text: &str) -> Result<Attitude, String> {
     let angles: Vec<&str> = text.split(',').collect();
     let [pitch, roll, heading] = angles[..] else {
         return Err(format!(
-            "found {}, expected pitch, roll and heading with commas between",
+            "found {}, expected pitch, roll and heading, separated by commas",
             turncal_input::counted(angles.len(), "number")
         ));
     };

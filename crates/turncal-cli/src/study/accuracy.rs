@@ -18,11 +18,11 @@ use turncal_report as report;
 
 /// Tests the accuracy of the filter and the consistency of its σ
 ///
-/// Simulates many runs, each with a different instrument, different noise and different table errors, and calibrates
-/// each with the filter and, on the static positions of the paper, with the closed form. Shows the RMS error of each
-/// group, and of the position after 40 h of navigation, compared with the Cramér–Rao bound and with the closed form,
-/// and the consistency of the filter σ (NEES, NIS, position errors within their predicted σ). Runs in which the filter
-/// fails are included.
+/// Simulates many runs, each with a different instrument, noise and table errors, and calibrates each run with the
+/// filter and, using the static positions of the paper, with the closed form. Shows the RMS error of each parameter
+/// group, and of the position after 40 h of navigation, compared with the Cramér–Rao bound and with the closed form.
+/// Also shows whether the σ of the filter are consistent with its errors (NEES, NIS, fraction of position errors within
+/// the predicted σ). The results include runs in which the filter fails.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal study accuracy --runs 500
@@ -35,7 +35,7 @@ pub struct Accuracy {
     /// Scenario: a TOML file or an embedded name
     #[arg(default_value = "demo")]
     scenario: String,
-    /// Different path: a TOML file or an embedded name
+    /// Path to use instead of the scenario's path: a TOML file or an embedded name
     #[arg(long, value_name = "PATH")]
     path: Option<String>,
     /// Observations used by the filter
@@ -53,7 +53,7 @@ pub struct Accuracy {
     /// Error terms to simulate but not to estimate
     #[arg(long, value_name = "TERM", value_parser = error_term(), value_delimiter = ',')]
     unmodelled: Vec<ErrorTerm>,
-    /// Noise used by the filter; the noise stated in a scenario is correct
+    /// Noise used by the filter; the noise that a scenario states is the true noise
     #[arg(long, value_parser = one_of(&NOISE), default_value = "stated")]
     noise: NoisePolicy,
     /// Number of runs

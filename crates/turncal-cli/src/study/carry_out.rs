@@ -1,4 +1,4 @@
-//! Runs of a whole study.
+//! Performs all runs of a study.
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -8,7 +8,7 @@ use crate::terminal::Runs;
 use turncal::study;
 use turncal_report::Document;
 
-/// Runs a whole study and delivers the document with its outcome.
+/// Performs a whole study and delivers the document with its results.
 pub fn carry_out<S: study::Study>(
     study: &S,
     delivery: &Delivery,

@@ -15,12 +15,13 @@ use turncal_report as report;
 const HOUR: f64 = 3600.0;
 const SCENARIO: &str = "experiment";
 
-/// Simulates the turntable experiment of the paper: navigation accuracy after each calibration
+/// Simulates the turntable experiment of the paper, and shows the navigation accuracy after each calibration
 ///
-/// Simulates many instruments on a table with position errors, with noise and Gauss–Markov biases. Calibrates each with
-/// the closed form on the paper's static positions, and with the filter in a sixth of that table time and in the same
-/// table time, in all misalignment forms. Navigates with the remaining errors: at rest, with self-alignment or perfect
-/// alignment, and moving. Shows the position error of every method, and the parameters that cause it.
+/// Simulates many instruments with noise and Gauss–Markov biases, on a table with position errors. Calibrates each
+/// instrument in all misalignment forms: with the closed form, which uses the static positions of the paper; with the
+/// filter, which uses one sixth of that table time; and with the filter in the full table time. Then navigates with the
+/// remaining errors, both at rest (with self-alignment or perfect alignment) and in motion. Shows the position error
+/// for every method, and the parameters that cause the error.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal study experiment
@@ -33,7 +34,7 @@ pub struct Experiment {
     /// Random seed [default: from the scenario]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = seed)]
     seed: Option<u64>,
-    /// Trajectory of the moving instrument: a TOML file or an embedded name
+    /// Trajectory for navigation in motion: a TOML file or an embedded name
     #[arg(long, value_name = "TRAJECTORY", default_value = "flight")]
     trajectory: String,
     /// Navigation time in hours (whole minutes, up to 1000)

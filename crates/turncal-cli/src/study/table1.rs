@@ -7,11 +7,12 @@ use turncal::study::table1::paper;
 use turncal::units::DEGREE;
 use turncal_report as report;
 
-/// Reproduces Table 1 of the paper: navigation errors due to a simplified misalignment form
+/// Reproduces Table 1 of the paper: navigation errors caused by a simplified misalignment form
 ///
-/// Draws misalignment angles as in the paper, calibrates gyros and accelerometers with the closed form in the six-angle
-/// and the three-angle form, without noise, and navigates with the remaining errors. Shows the largest errors next to
-/// the figures in the paper, for every reading of its text, and states which figures a correct program reproduces.
+/// Draws random misalignment angles as in the paper, calibrates gyros and accelerometers without noise (closed form,
+/// six-angle and three-angle form), and navigates with the remaining errors. Shows the largest errors next to the
+/// published figures, for each interpretation of the text of the paper, and states which figures a correct program
+/// reproduces.
 #[derive(Debug, clap::Args)]
 #[command(mut_arg("output", |output| output.help("Directory for a report with Figures 2 to 9 of the paper")))]
 #[command(after_help = "Examples:
@@ -19,16 +20,16 @@ use turncal_report as report;
   turncal study table1 --samples 4000 --json
   turncal study table1 --hours 48 --latitude-deg 41.6")]
 pub struct Table1 {
-    /// Number of samples
+    /// Number of random samples
     #[arg(long, value_name = "N", default_value_t = paper::SAMPLES as u64, value_parser = at_least_two)]
     samples: u64,
     /// Random seed
     #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = seed)]
     seed: u64,
-    /// Duration of a run in hours (one minute to 1000 h)
+    /// Duration of each navigation run in hours (one minute to 1000 h)
     #[arg(long, default_value_t = paper::HOURS, value_parser = hours)]
     hours: f64,
-    /// Geodetic latitude in degrees; the paper states none, but its figures imply 45.78
+    /// Geodetic latitude in degrees; the paper does not state it, but the published figures imply 45.78
     #[arg(long, default_value_t = paper::LATITUDE_DEG, value_name = "L", allow_negative_numbers = true, value_parser = latitude)]
     latitude_deg: f64,
     #[command(flatten)]

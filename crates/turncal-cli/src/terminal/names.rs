@@ -1,9 +1,9 @@
-//! Names of files in tables and messages.
+//! File names for tables and messages.
 
 use std::ffi::OsStr;
 use std::path::Path;
 
-/// File stems; if equal, directory names; if those are also equal, whole paths.
+/// Returns the file stems if they differ, otherwise the directory names if these differ, otherwise the whole paths.
 pub fn short_names(paths: &[&Path]) -> Vec<String> {
     let shown = |name: &OsStr| name.to_string_lossy().into_owned();
     let stem = |path: &Path| path.file_stem().map(shown);

@@ -16,7 +16,7 @@ pub fn show(document: &Document, json: bool) -> anyhow::Result<()> {
     print(text.as_bytes())
 }
 
-/// Prints the one-screen form of a document.
+/// Prints the short form of a document, which fits on one screen.
 pub fn show_brief(document: &Document) -> anyhow::Result<()> {
     let text = terminal::brief(document, columns().map(usize::from));
     let is_plain = !io::stdout().is_terminal() || std::env::var_os("NO_COLOR").is_some();
@@ -38,13 +38,13 @@ fn in_colour(word: Word) -> String {
     format!("\u{1b}[1;{colour}m{word}\u{1b}[0m")
 }
 
-/// Width of standard output: that of its terminal, otherwise COLUMNS, otherwise unlimited.
+/// Width of standard output: the width of its terminal, otherwise COLUMNS, otherwise unlimited.
 pub fn columns() -> Option<u16> {
     let terminal = terminal_size::terminal_size_of(io::stdout()).map(|(width, _)| width.0);
     terminal.or_else(|| std::env::var("COLUMNS").ok()?.parse().ok())
 }
 
-/// Writes to standard output. A closed pipe, as with `head`, is not a failure.
+/// Writes to standard output. A closed pipe, as with `head`, is not an error.
 pub fn print(bytes: &[u8]) -> anyhow::Result<()> {
     stream(|stdout| stdout.write_all(bytes))
 }

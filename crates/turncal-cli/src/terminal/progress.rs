@@ -1,4 +1,4 @@
-//! Progress on a terminal; none if standard error is a file or a pipe.
+//! Progress display on a terminal; if standard error is a file or a pipe, nothing is shown.
 
 use std::sync::mpsc::{self, RecvTimeoutError, Sender};
 use std::thread;
@@ -27,12 +27,12 @@ impl Activity {
         Self { bar, ticking }
     }
 
-    /// Shows the next activity.
+    /// Shows the next activity of the command.
     pub fn next(&self, message: impl Into<String>) {
         self.bar.set_message(printable(&message.into()));
     }
 
-    /// Shows a pass of the filter.
+    /// Shows that the filter performs a pass.
     pub fn pass(&self, pass: &Pass) {
         let step = pass.largest_step;
         self.next(format!("iteration done, largest step {step:.2} σ"));

@@ -7,7 +7,8 @@ static ENDS_GENTLY: AtomicBool = AtomicBool::new(false);
 /// Whether Ctrl-C was pressed.
 static ENDED: AtomicBool = AtomicBool::new(false);
 
-/// From this call on, the first Ctrl-C or termination request makes [`is_ended`] true; the next one ends the command.
+/// After this call, the first Ctrl-C or termination request makes [`is_ended`] return true; the next one ends the
+/// command.
 pub fn end_gently() {
     ENDS_GENTLY.store(true, Ordering::SeqCst);
 }
@@ -17,8 +18,8 @@ pub fn is_ended() -> bool {
     ENDED.load(Ordering::SeqCst)
 }
 
-/// Ends the command without incomplete output on Ctrl-C, a termination request or a lost terminal; shells report status
-/// 130, 143 and 129.
+/// Ends the command without leaving incomplete output on Ctrl-C, on a termination request, or if the terminal is lost;
+/// shells report status 130, 143 and 129.
 #[cfg(unix)]
 pub fn leave_nothing_behind() {
     use std::process;
@@ -74,6 +75,6 @@ fn is_ignored(signal: i32) -> bool {
     mask.is_some_and(|mask| mask >> (signal - 1) & 1 == 1)
 }
 
-/// On other systems, the next run cleans up.
+/// On other systems, the next run removes the incomplete output.
 #[cfg(not(unix))]
 pub fn leave_nothing_behind() {}

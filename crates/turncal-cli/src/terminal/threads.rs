@@ -1,4 +1,4 @@
-//! Number of threads of a command.
+//! Number of threads used by a command.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -6,8 +6,8 @@ use std::thread;
 
 use rayon::{ThreadPoolBuildError, ThreadPoolBuilder};
 
-/// Runs `work` on one thread per processor, on the number given in RAYON_NUM_THREADS, or only on the current thread if
-/// the system refuses more.
+/// Runs `work` on one thread per processor or on the number of threads given in RAYON_NUM_THREADS; if the system
+/// refuses further threads, runs it on the current thread.
 pub fn with_threads<T: Send>(work: impl FnOnce() -> T + Send) -> Result<T, ThreadPoolBuildError> {
     match ThreadPoolBuilder::new().build() {
         Ok(pool) if pool.current_num_threads() > 1 => return Ok(pool.install(work)),
@@ -15,7 +15,9 @@ pub fn with_threads<T: Send>(work: impl FnOnce() -> T + Send) -> Result<T, Threa
         // thread and, if that fails, tries again at each allocation.
         Ok(_) => {}
         Err(_) => {
-            tell!("note: the system does not allow more threads; using one thread");
+            tell!(
+                "note: the operating system does not allow more threads, so turncal uses only one"
+            );
         }
     }
     let alone = ThreadPoolBuilder::new().num_threads(1).use_current_thread();
@@ -23,8 +25,8 @@ pub fn with_threads<T: Send>(work: impl FnOnce() -> T + Send) -> Result<T, Threa
     Ok(work())
 }
 
-/// Computes `count` pieces of work, one at a time per thread, so that at most one per thread is in memory. Results are
-/// in order.
+/// Computes `count` work items. Each thread holds only one item in memory at a time. The results are returned in the
+/// order of the items.
 pub fn piece_by_piece<T: Send>(count: usize, work: impl Fn(usize) -> T + Sync) -> Vec<T> {
     let next = AtomicUsize::new(0);
     let results: Mutex<Vec<(usize, T)>> = Mutex::new(Vec::with_capacity(count));

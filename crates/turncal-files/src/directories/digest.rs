@@ -1,4 +1,4 @@
-//! SHA-256 of bytes and files, to identify inputs.
+//! SHA-256 of bytes and files, which identifies inputs.
 
 use std::fs::File;
 use std::io::{self, Read};
@@ -39,10 +39,10 @@ fn digest_of_file(path: &Path) -> io::Result<String> {
     }
 }
 
-/// The files of a run, as named in its run.toml, each with its digest or, if unreadable, the system error. The run.toml
-/// comes first.
+/// The files named in the run.toml of a run, each with its digest or, if it cannot be read, with the system error. The
+/// run.toml comes first.
 ///
-/// For a campaign: its file, then those of each recording, in the order of their paths.
+/// For a campaign: the campaign file, then the files of each recording, in the order of the recordings' paths.
 pub fn input_digests(run: &Path) -> Vec<(String, String)> {
     let file = table_of(run);
     let recordings = file.get("recording").and_then(Value::as_array);

@@ -1,5 +1,5 @@
-//! `job.json`: identifies the job (or part of a job) in a directory, to distinguish parts of different jobs and to
-//! resume a job.
+//! `job.json`: identifies the job (or part of a job) in a directory, so that parts of different jobs can be
+//! distinguished and a job can be resumed.
 
 use std::path::Path;
 
@@ -10,12 +10,12 @@ use super::digest::digest_of;
 use turncal::study::Shard;
 use turncal_input::{FileError, small_file};
 
-/// The name of the file in its directory.
+/// The name of this file in its directory.
 pub const JOB_FILE: &str = "job.json";
-/// The version of the format.
+/// The version of the file format.
 const FORMAT: &str = "turncal-job/1";
 
-/// A job of many runs.
+/// A job that consists of many runs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Job {
     /// Always [`FORMAT`].
@@ -24,16 +24,16 @@ pub struct Job {
     pub job: JobKind,
     /// The program's version.
     pub version: String,
-    /// Processor type and features; they affect rounding.
+    /// Processor type and features, which affect rounding.
     pub processor: Vec<String>,
-    /// All options that determine the result of a run.
+    /// All options that affect the result of a run.
     pub options: Value,
     /// Total number of runs.
     pub runs: u64,
     /// Names of the runs of a lot.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub names: Vec<String>,
-    /// Specification for the results; does not change the result of a run.
+    /// Specification for evaluating the results, which does not change the result of a run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub specification: Option<turncal::lot::Specification>,
 }
@@ -58,19 +58,19 @@ pub struct Part {
     pub job: Job,
     /// SHA-256 of the job.
     pub digest: String,
-    /// The part; `None` for the whole job.
+    /// The part in this directory; `None` for the whole job.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shard: Option<Shard>,
-    /// Numbers of its runs, from zero; empty for the whole job.
+    /// Numbers of the part's runs, from zero; empty for the whole job.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub holds: Vec<u64>,
-    /// SHA-256 of the file of results in the same directory.
+    /// SHA-256 of the results file in the same directory.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub results: Option<String>,
 }
 
 impl Job {
-    /// A job of this program on this processor.
+    /// A job of this version of the program on this processor.
     pub fn new(job: JobKind, options: Value, runs: u64) -> Self {
         Self {
             format: FORMAT.to_owned(),
@@ -84,12 +84,13 @@ impl Job {
         }
     }
 
-    /// SHA-256 of all options that determine the result of a run.
+    /// SHA-256 of all options that affect the result of a run.
     pub fn key(&self) -> String {
         digest_of(&(&self.version, &self.processor, self.job, &self.options))
     }
 
-    /// First difference between two jobs that affects the result of a run, in words; `None` if there is none.
+    /// The first difference between two jobs that affects the result of a run, in words; `None` if there is no such
+    /// difference.
     pub fn difference(&self, other: &Self) -> Option<String> {
         let decisive = |of: &Self| {
             serde_json::json!({
@@ -102,7 +103,7 @@ impl Job {
         first_difference("", &decisive(self), &decisive(other))
     }
 
-    /// First difference of any kind.
+    /// The first difference between two jobs, of any kind.
     pub fn any_difference(&self, other: &Self) -> Option<String> {
         let [one, other] = [self, other].map(|of| serde_json::to_value(of).unwrap_or_default());
         first_difference("", &one, &other)
@@ -133,7 +134,7 @@ fn first_difference(name: &str, a: &Value, b: &Value) -> Option<String> {
 }
 
 impl Part {
-    /// The whole job, or the part with these runs.
+    /// The whole job, or the part that contains these runs.
     pub fn new(job: Job, shard: Option<Shard>) -> Self {
         Self {
             digest: digest_of(&job),
@@ -144,7 +145,7 @@ impl Part {
         }
     }
 
-    /// Numbers of its runs.
+    /// Numbers of the runs in this job or part.
     pub fn held(&self) -> Vec<u64> {
         match self.shard {
             Some(_) => self.holds.clone(),
@@ -165,8 +166,8 @@ impl Part {
         };
         let is_lot = part.job.job == JobKind::Lot;
         if part.digest != digest_of(&part.job) || !is_whole || (is_lot && !named) {
-            let found = "a job whose digest or run list does not match";
-            let expected = "the job as turncal wrote it";
+            let found = "a job file whose digest or run list does not match its content";
+            let expected = "the job file as turncal wrote it";
             return Err(FileError::of(&path, found, expected, advice));
         }
         Ok(part)

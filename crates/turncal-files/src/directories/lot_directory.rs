@@ -1,5 +1,5 @@
-//! The directory of a lot, which grows unit by unit: `job.json`, complete directories `units/NAME/`, and finally the
-//! summary of all units. If the same job is started again, it continues where it stopped.
+//! The directory of a lot, which grows unit by unit: `job.json`, the complete directories `units/NAME/`, and finally
+//! the summary of all units. If the same job is started again, it continues where it stopped.
 
 use crate::calibration_json;
 use std::collections::BTreeMap;
@@ -48,23 +48,24 @@ struct UnitRecord {
     failure: Option<String>,
 }
 
-/// Inputs that determine the result of a unit: the job without its list of units, and the files of the unit.
+/// Inputs that determine the result of a unit: the job without its list of units, and the files that belong to the
+/// unit.
 pub fn unit_key(job: &str, run: &Path) -> String {
     digest_of(&(job, input_digests(run)))
 }
 
-/// A unit in the directory of a part of its lot.
+/// A unit in the directory of one part of its lot.
 pub fn read_part_unit(part: &Path, name: &str) -> Result<Unit, FileError> {
     Ok(read_unit(&part.join(UNITS).join(name), None)?.0)
 }
 
 impl LotDirectory {
-    /// Creates a lot directory, or continues one started by the same job; `waiting` is called if another process must
+    /// Creates a lot directory, or continues one that the same job started; calls `waiting` if another process must
     /// finish first. With `force` the lot restarts from the beginning.
     ///
     /// # Errors
-    /// [`FileError`] if the directory contains another job, another part of this job, units that do not belong to this
-    /// lot, or files not written by turncal in places that would be overwritten.
+    /// Returns [`FileError`] if the directory contains another job, another part of this job, units that do not belong
+    /// to this lot, or files not written by turncal in places that would be overwritten.
     pub fn open(
         target: &Path,
         part: &Part,
@@ -95,7 +96,7 @@ impl LotDirectory {
         Ok(Self { root, _lock })
     }
 
-    /// The previously calibrated unit, if its inputs are unchanged.
+    /// The unit from an earlier run, if it was calibrated from the same inputs.
     pub fn kept(&self, name: &str, key: &str) -> Option<Unit> {
         let unit = read_unit(&self.root.join(UNITS).join(name), Some(key));
         Some(unit.ok()?.0)
@@ -133,7 +134,7 @@ impl LotDirectory {
         Ok(unit)
     }
 
-    /// Stores the summary of all units; removes outdated files.
+    /// Stores the summary of all units, and removes outdated files.
     pub fn finish(&self, files: &[(String, String)]) -> Result<(), FileError> {
         clear_abandoned(&self.root.join(UNITS));
         let below = below_units();
@@ -175,7 +176,7 @@ fn check_same(target: &Path, found: &Part, expected: &Part) -> Result<(), FileEr
     });
     difference.map_or(Ok(()), |difference| {
         let found = format_args!("a lot started with other options ({difference})");
-        let expected = "the options of the job started here";
+        let expected = "a lot started with the options of this command";
         let advice = "Use the same options, choose another directory, or add --force to restart.";
         Err(FileError::of(target, found, expected, advice))
     })
@@ -189,8 +190,8 @@ fn check_units(units: &Path, part: &Part) -> Result<(), FileError> {
     let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
     let others = names.filter(|name| !name.starts_with('.') && !held.contains(&name));
     others.min().map_or(Ok(()), |other| {
-        let found = format_args!("unit `{other}`, which is not among the given runs");
-        let advice = "Also give its run.toml, choose another directory, or add --force to restart.";
+        let found = format_args!("unit `{other}`, which is not among the runs of this command");
+        let advice = "Also give the run.toml of this unit, choose another directory, or add --force to restart.";
         Err(FileError::of(
             units,
             found,
@@ -206,7 +207,10 @@ fn read_unit(directory: &Path, key: Option<&str>) -> Result<(Unit, String), File
     let record: UnitRecord =
         small_file::json(&path, "a unit", FORMAT, "Calibrate the unit again.")?;
     let wrong = |found: &str| {
-        let (expected, advice) = ("the unit as turncal wrote it", "Calibrate it again.");
+        let (expected, advice) = (
+            "the unit.json file as turncal wrote it",
+            "Calibrate it again.",
+        );
         Err(FileError::of(directory, found, expected, advice))
     };
     if key.is_some_and(|key| record.key != key) {
@@ -216,7 +220,7 @@ fn read_unit(directory: &Path, key: Option<&str>) -> Result<(Unit, String), File
     let bytes = turncal_input::small_file::read(&path);
     let digest = bytes.ok().map(|bytes| digest_of_bytes(&bytes));
     if record.failure.is_none() && record.calibration_sha256 != digest {
-        return wrong("a calibration.json that does not belong to it");
+        return wrong("a calibration.json that belongs to another unit");
     }
     let calibrated = match record.failure {
         Some(failure) => Err(failure),

@@ -1,4 +1,4 @@
-//! Result directories: of a single result (complete or absent), of a lot, and of a job and its parts.
+//! Result directories: of a single result (which is either complete or absent), of a lot, and of a job and its parts.
 
 mod digest;
 mod job;

@@ -1,4 +1,4 @@
-//! Parts of a job: each is written by one machine, and one machine merges them.
+//! Parts of a job. Each part is written by one machine, and one machine merges all parts.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -34,7 +34,7 @@ pub fn write_part<T: Serialize>(directory: &Path, part: Part, runs: &[T]) -> Res
     write(JOB_FILE, &part.to_json())
 }
 
-/// Whether a directory contains this part of a study completely.
+/// Whether a directory contains this part of a study, and the part is complete.
 pub fn part_is_there(directory: &Path, part: &Part) -> bool {
     let found = (Part::read(directory), fs::read(directory.join(RESULTS)));
     let (Ok(found), Ok(results)) = found else {
@@ -58,7 +58,7 @@ pub struct Parts {
 }
 
 impl Parts {
-    /// Reads the job records of directories.
+    /// Reads the job records in several directories.
     ///
     /// # Errors [`FileError`] if a directory is not a part, if the parts belong to different jobs, or if a run is missing or is in two parts.
     pub fn read(directories: &[PathBuf]) -> Result<Self, FileError> {
@@ -67,7 +67,7 @@ impl Parts {
         let parts = parts?;
         let Some((first, reference)) = parts.first() else {
             let (found, expected) = ("no part", "all parts of a job");
-            let advice = "Give the directories that --shard wrote.";
+            let advice = "Give the directories that were written with --shard.";
             return Err(FileError::of(Path::new("."), found, expected, advice));
         };
         for (directory, part) in &parts[1..] {
@@ -101,7 +101,10 @@ impl Parts {
         {
             let (run, other) = (self.name(*run), other.display());
             let found = format_args!("run {run}, which is also in {other}");
-            let (expected, advice) = ("each run in one part only", "Leave out one of the two.");
+            let (expected, advice) = (
+                "each run in only one part",
+                "Leave out one of these two parts.",
+            );
             return Err(FileError::of(directory, found, expected, advice));
         }
         let missing = self.job.runs.saturating_sub(held.len() as u64);
@@ -148,7 +151,7 @@ impl Parts {
     /// The results of all runs of a study, in the order of their numbers.
     ///
     /// # Errors
-    /// [`FileError`] if the results were modified.
+    /// Returns [`FileError`] if the results were modified.
     pub fn results<T: DeserializeOwned>(&self) -> Result<Vec<T>, FileError> {
         let mut all: Vec<(u64, T)> = Vec::new();
         for (directory, part) in &self.parts {
@@ -161,7 +164,9 @@ impl Parts {
                 FileError::of(&path, found, expected, advice)
             };
             if part.results.as_deref() != Some(digest_of_bytes(&bytes).as_str()) {
-                return Err(wrong("results that do not match their digest".to_owned()));
+                return Err(wrong(
+                    "results that do not match their SHA-256 digest".to_owned(),
+                ));
             }
             let runs: Vec<T> =
                 rmp_serde::from_slice(&bytes).map_err(|error| wrong(error.to_string()))?;
@@ -175,7 +180,7 @@ impl Parts {
         Ok(all.into_iter().map(|(_, result)| result).collect())
     }
 
-    /// Name and part of every unit of a lot, in its order.
+    /// Name of every unit of a lot, and the part that contains it, in the order of the lot.
     pub fn units(&self) -> Vec<(&str, &Path)> {
         let mut all = self.held();
         all.sort();

@@ -1,7 +1,7 @@
-//! Output that is complete or absent: written next to its target, then renamed.
+//! Output that is either complete or absent: turncal writes it next to its target and then renames it.
 //!
-//! A process that ends on a signal removes unfinished output ([`Unfinished`]); leftovers of a killed process
-//! are removed when the next output is started there.
+//! A process that is ended by a signal removes unfinished output ([`Unfinished`]); the leftovers of a killed process
+//! are removed when the next output is started in the same place.
 
 mod manifest;
 mod stage;
@@ -17,7 +17,7 @@ pub use stage::Unfinished;
 use stage::{Stage, taken, unwritable};
 use turncal_input::FileError;
 
-/// A directory under construction. Dropped without [`Self::commit`], it leaves nothing behind.
+/// A directory under construction. If it is dropped without [`Self::commit`], no file remains.
 pub struct WholeDirectory {
     stage: Stage,
     force: bool,
@@ -50,13 +50,13 @@ impl WholeDirectory {
             let mut needed = inputs.iter().copied().chain([here]);
             if let Some(held) = needed.find(inside) {
                 let found = if held == here {
-                    "the current directory in it".to_owned()
+                    "the current working directory inside it".to_owned()
                 } else {
                     format!("{} in it", held.display())
                 };
                 let expected = "a directory that can be replaced";
-                let advice = "Choose another name, because replacing this directory would delete files that are still \
-                    needed.";
+                let advice = "Choose another name, because replacing this directory would delete files that are in \
+                              use.";
                 return Err(FileError::of(target, found, expected, advice));
             }
             only_output(target)?;
@@ -97,8 +97,8 @@ impl WholeDirectory {
     }
 }
 
-/// Writes the list of a growing directory, according to which only these names belong to turncal; entries that end in
-/// `/` have their own list. Files named only in the previous list are deleted.
+/// Writes the list of a growing directory; it states that only these names belong to turncal. Entries that end in `/`
+/// are directories with their own list. Files that are named only in the previous list are deleted.
 pub fn list_anew(directory: &Path, names: &[&str]) -> Result<(), FileError> {
     for old in manifest::listed_files(directory) {
         let still = |name: &&str| old.file_name() == Some(name.as_ref());
@@ -111,7 +111,7 @@ pub fn list_anew(directory: &Path, names: &[&str]) -> Result<(), FileError> {
     write_whole(&directory.join(manifest::FILE), list.as_bytes(), true)
 }
 
-/// Removes unfinished output of a killed process from a directory.
+/// Removes the unfinished output of a killed process from a directory.
 pub fn clear_abandoned(directory: &Path) {
     stage::remove_abandoned(directory);
 }
@@ -122,15 +122,16 @@ fn only_output(directory: &Path) -> Result<(), FileError> {
         .map_err(|error| unwritable(directory, "list the directory", &error))?;
     foreign.map_or(Ok(()), |foreign| {
         let (name, list) = (foreign.display(), manifest::FILE);
-        let found = format!("`{name}` in it, which is not in turncal's list of its own files (`{list}`)");
-        let expected = "a directory with only files that turncal wrote";
+        let found = format!("the file `{name}` in it, which is not in turncal's list of its own files (`{list}`)");
+        let expected = "a directory that contains only files written by turncal";
         let advice = "Move this file elsewhere or choose another name, because replacing the directory would delete \
             the file.";
         Err(FileError::of(directory, found, expected, advice))
     })
 }
 
-/// Writes a complete file or none; an existing file is replaced only with `force`, a directory never.
+/// Writes a file completely or not at all. An existing file is replaced only with `force`; a directory is never
+/// replaced.
 pub fn write_whole(path: &Path, bytes: &[u8], force: bool) -> Result<(), FileError> {
     write_whole_with(path, force, |mut file| file.write_all(bytes))
 }

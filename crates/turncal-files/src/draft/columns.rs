@@ -9,22 +9,22 @@ use crate::Sheet;
 use crate::quantity::Of;
 use turncal::imu::{PerSensor, Sensor};
 
-/// Columns by index in the file.
+/// Columns, given by their index in the file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Columns {
     pub names: Vec<String>,
     pub time: Option<usize>,
-    /// Nanoseconds in addition to a time in whole seconds.
+    /// Column of nanoseconds to be added to a time column in whole seconds.
     pub nanoseconds: Option<usize>,
     pub triads: PerSensor<Option<[usize; 3]>>,
-    /// Other candidates for the triads.
+    /// Other candidates for the gyro and accelerometer triads.
     pub others: PerSensor<Vec<[usize; 3]>>,
-    /// Whether the triads were identified by value, because their names are not informative.
+    /// Whether the triads were identified by their values, because the column names are not informative.
     pub by_size: bool,
-    /// Why the triads that were identified by value are a guess.
+    /// Reasons why triads that were identified by their values are only a guess.
     pub doubt: Option<Doubt>,
     pub temperature: Option<usize>,
-    /// Four columns with a norm of one.
+    /// Four columns that form a quaternion, because their norm is one.
     pub quaternion: Option<[usize; 4]>,
 }
 
@@ -134,7 +134,7 @@ impl Columns {
         })
     }
 
-    /// Rows with numeric triads, and their samples; zeros for a missing triad.
+    /// Rows in which both triads are numeric, and their samples; a missing triad has zeros.
     pub fn samples(&self, sheet: &Sheet) -> Option<(Vec<usize>, Samples)> {
         let at = |sensor: Sensor, row: usize| match self.triads.get(sensor) {
             Some(columns) => Vector3::from(columns.map(|k| sheet.columns[k][row])),
@@ -164,13 +164,13 @@ fn distinct(names: &[String], column: usize) -> String {
     }
 }
 
-/// Columns that belong to this sensor by name.
+/// Columns whose names belong to this sensor.
 pub fn named(sheet: &Sheet, sensor: Sensor) -> Vec<usize> {
     let is = |k: &usize| Name::of(&sheet.names[*k]).sensor() == Some(sensor);
     (0..sheet.names.len()).filter(is).collect()
 }
 
-/// Whether gyros and accelerometers have separate rows, by their names.
+/// Whether the column names show that gyros and accelerometers are in separate rows.
 pub fn have_rows_of_their_own(sheet: &Sheet) -> bool {
     let places = PerSensor::from_fn(|sensor| named(sheet, sensor));
     let (mut both, mut one) = (0, 0);
@@ -192,7 +192,7 @@ fn varies(values: &[f64]) -> bool {
     first.is_some_and(|first| values.any(|value| value != first))
 }
 
-/// Name and value of the first column that has the name of a time but never changes.
+/// Name and value of the first column whose name is that of a time, but whose value never changes.
 pub fn standing_time(sheet: &Sheet) -> Option<(&str, f64)> {
     let mut columns = sheet.names.iter().zip(&sheet.columns);
     let stands = |(name, values): &(&String, &Vec<f64>)| {
@@ -201,6 +201,17 @@ pub fn standing_time(sheet: &Sheet) -> Option<(&str, f64)> {
     };
     let (name, values) = columns.find(stands)?;
     Some((name.as_str(), *values.first()?))
+}
+
+/// The first column with the name of a time that falls from row to row.
+pub fn falling_time(sheet: &Sheet) -> Option<&str> {
+    let falls = |k: &usize| {
+        let is_text = sheet.units[*k] == "h:m:s";
+        let (_, back) = forward(sheet.columns[*k].iter().copied());
+        back >= FORWARD && (is_text || Name::of(&sheet.names[*k]).is_time() > 1)
+    };
+    let column = (0..sheet.names.len()).find(falls)?;
+    Some(&sheet.names[column])
 }
 
 fn is_numeric(sheet: &Sheet, column: usize) -> bool {
@@ -235,7 +246,7 @@ fn split_time(sheet: &Sheet, names: &[Name]) -> Option<[usize; 2]> {
     Some([pair, pair + 1])
 }
 
-/// The column that distinguishes several instruments, with its value for the first.
+/// The column that distinguishes several instruments, with its value for the first of them.
 pub fn instance(sheet: &Sheet) -> Option<(usize, f64)> {
     let tells = |k: &usize| {
         let mut known: Vec<f64> = Vec::new();
@@ -266,6 +277,11 @@ fn forward(values: impl Iterator<Item = f64>) -> (f64, f64) {
     (forward / f64::max(steps, 1.0), back / f64::max(steps, 1.0))
 }
 
+/// Whether a column counts rows.
+fn counts(values: &[f64]) -> bool {
+    values.windows(2).all(|pair| pair[1] - pair[0] == 1.0)
+}
+
 /// The column whose name is most like a time, otherwise the first increasing column.
 fn time(sheet: &Sheet, names: &[Name], forward: impl Fn(usize) -> (f64, f64)) -> Option<usize> {
     let goes_on = |k: &usize| match forward(*k) {
@@ -279,7 +295,13 @@ fn time(sheet: &Sheet, names: &[Name], forward: impl Fn(usize) -> (f64, f64)) ->
         // Raw ticks rank after times that have a unit.
         let is_raw = names[*k].unit.is_some_and(|unit| unit.word == "count");
         let named = names[*k].is_time().saturating_sub(u8::from(is_raw));
-        (named, names[*k].is_of_time() && !is_text, names.len() - k)
+        let is_of_time = names[*k].is_of_time() && !is_text;
+        (
+            named,
+            is_of_time,
+            !counts(&sheet.columns[*k]),
+            names.len() - k,
+        )
     };
     let best = (0..names.len()).filter(goes_on).max_by_key(rank)?;
     // The angle of an integrating sensor and a rising temperature also increase steadily.

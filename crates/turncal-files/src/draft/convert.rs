@@ -1,4 +1,4 @@
-//! A log of another program as rows of text, with a draft for them.
+//! The log of another program, converted to rows of text, with a draft that describes them.
 
 use std::fs::{self, File};
 use std::io::{self, Write};
@@ -16,11 +16,11 @@ const GYRO_FILE: &str = "imu.csv.gz";
 const ACCEL_FILE: &str = "accelerometers.csv.gz";
 
 impl Draft {
-    /// Writes the streams of the instrument as text, with this draft for them, into an existing directory; a damaged
-    /// log is written only if its intact part is to be used.
+    /// Writes the streams of the instrument as text, with this draft, into an existing directory; a damaged log is
+    /// written only if the user allowed the use of its intact part.
     ///
     /// # Errors
-    /// [`FileError`] if the log is already text, is damaged, or cannot be read or written.
+    /// Returns [`FileError`] if the log is already text, is damaged, or cannot be read or written.
     pub fn convert(mut self, log: &Path, directory: &Path, salvage: bool) -> Result<(), FileError> {
         let streams = self.streams.as_mut().filter(|of| of.written.is_none());
         let Some(streams) = streams else {

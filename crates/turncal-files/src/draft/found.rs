@@ -1,4 +1,4 @@
-//! Fields detected in a log, with their certainty.
+//! Fields detected in a log, and how certain they are.
 
 use std::path::Path;
 
@@ -23,7 +23,7 @@ pub struct Found {
 }
 
 impl Draft {
-    /// Detected fields, in display order.
+    /// All detected fields, in the order in which they are displayed.
     pub fn found(&self) -> Vec<Found> {
         vec![
             self.time_found(),
@@ -56,7 +56,7 @@ impl Draft {
             self.columns.triads.accel.is_some() && !self.motion.as_ref().is_some_and(is_zero);
         let why = match &*field {
             "gyro_unit" if !has_accels => {
-                "no columns were recognised as accelerometers that measure gravity".to_owned()
+                "no columns recognised as accelerometers that measure gravity".to_owned()
             }
             _ => why,
         };
@@ -92,15 +92,19 @@ impl Draft {
     pub(crate) fn doubts(&self) -> impl Iterator<Item = String> + '_ {
         let of_units = Sensor::ALL.into_iter().filter_map(|sensor| {
             let unit = self.quantities.units.get(sensor);
-            let scale = unit.scale.as_ref().filter(|_| unit.is_unfit)?;
-            let (name, why, found) = (sensor.name(), &unit.why, &scale.why);
+            let (name, why) = (sensor.name(), &unit.why);
+            let found = match (&unit.scale, unit.word) {
+                _ if !unit.is_unfit => return None,
+                (Some(scale), _) => format!("estimated {}", scale.why),
+                (None, word) => format!("used {}", word?),
+            };
             Some(format!(
-                "The unit of the {name} rows is not clear: {why}. turncal estimated {found}. Check --rate, and state \
+                "The unit of the {name} rows is uncertain: {why}. turncal {found}. Check --rate, and state \
                  --{name}-unit."
             ))
         });
         let left_out = self.left_out.map(|_| {
-            "turncal left out the gyros, because their unit cannot be told: the sensor was not turned. For their \
+            "turncal left out the gyros because their unit cannot be determined without turns. To estimate the gyro \
              biases, add --gyro-unit."
                 .to_owned()
         });
@@ -115,7 +119,7 @@ impl Draft {
                 "time",
                 "none",
                 Certainty::Guess,
-                "a row is the mean of a position",
+                "each row is the mean of the output in one position",
             );
         }
         let name = self.columns.time.map(|k| self.columns.names[k].as_str());
@@ -142,7 +146,7 @@ impl Draft {
         let unit = self.quantities.units.get(sensor);
         if let Some(triad) = self.left_out.filter(|_| sensor == Sensor::Gyro) {
             let names = triad.map(|k| self.columns.names[k].as_str()).join(" ");
-            let why = "the sensor was not turned; add --gyro-unit for their biases";
+            let why = "the sensor was not turned; to estimate the gyro biases, add --gyro-unit";
             return Found::new(what, format!("{names}, left out"), Certainty::Unknown, why);
         }
         let Some(triad) = self.columns.triads.get(sensor) else {
@@ -151,7 +155,9 @@ impl Draft {
         let names = triad.map(|k| self.columns.names[k].as_str()).join(" ");
         let certainty = match unit.word {
             None => Certainty::Unknown,
-            Some(_) if unit.is_shown && self.columns.doubt.is_none() => Certainty::Certain,
+            Some(_) if unit.is_shown && !unit.is_unfit && self.columns.doubt.is_none() => {
+                Certainty::Certain
+            }
             Some(_) => Certainty::Guess,
         };
         let mut value = format!("{names}, {}", unit.word.unwrap_or("unit unknown"));
@@ -188,7 +194,7 @@ impl Draft {
             return Found::new("place", place.join(", "), Certainty::Certain, "as stated");
         }
         let gravity = "gravity 9.806 ± 0.015 m/s²";
-        let why = "set --latitude and --height for smaller σ";
+        let why = "to reduce the σ, set --latitude and --height";
         Found::new("place", gravity, Certainty::Unknown, why)
     }
 }

@@ -1,4 +1,5 @@
-//! A draft of `run.toml` for a log without one: detected fields with reasons, and open fields for the user.
+//! A draft of `run.toml` for a log that has none: detected fields with reasons, and open fields for the user to
+//! complete.
 
 mod columns;
 mod convert;
@@ -20,7 +21,7 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 
-use crate::Sheet;
+use crate::{Sheet, unit_scale};
 use columns::Columns;
 pub use found::Found;
 use motion::Motion;
@@ -30,19 +31,23 @@ pub use stated::{DataSheetError, KalibrImu, Stated, StatedColumns, StatedUnit};
 use streams::{FEWEST_ROWS, Streams};
 pub use time::Certainty;
 use time::Clock;
-use turncal::imu::{PerSensor, Sensor};
+use turncal::imu::{Output, PerSensor, Sensor};
 use turncal::noise::{Clusters, TriadNoise};
+use turncal::number::rounded;
+use turncal::units::STANDARD_GRAVITY;
 use turncal_input::FileError;
 use turncal_logs::DataFile;
 use units::Quantities;
 
 /// Minimum number of samples at rest for a noise estimate.
 const FEWEST_AT_REST: usize = 64;
+/// Fraction of gravity that no scale or bias of an accelerometer leaves.
+const LITTLE: f64 = 0.3;
 
-const NO_COLUMNS: &str = "not recognised by name or values";
+const NO_COLUMNS: &str = "not recognised by their names or values";
 const AXES_OF_PROGRAM: &str = "axis convention of the program that wrote the log";
 
-/// Information in a log about the instrument and its recording.
+/// Information about the instrument and its recording, found in a log.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Draft {
     /// Content of the streams, if the log has streams.
@@ -78,15 +83,15 @@ impl Draft {
     /// Examines a file of rows.
     ///
     /// # Errors
-    /// [`FileError`] if it cannot be read or has too few rows.
+    /// Returns [`FileError`] if the file cannot be read or has too few rows.
     pub fn of_file(path: &Path) -> Result<Self, FileError> {
         Self::of_stream(&path.into(), None, &Stated::default())
     }
 
-    /// Examines one stream of a log, with statements about it.
+    /// Examines one stream of a log, using the information that the user gave about it.
     ///
     /// # Errors
-    /// [`FileError`] if it cannot be read or has too few rows.
+    /// Returns [`FileError`] if the file cannot be read or has too few rows.
     pub fn of_stream(
         file: &DataFile,
         stream: Option<&str>,
@@ -130,24 +135,26 @@ impl Draft {
         let columns = &mut draft.columns;
         let PerSensor { gyro, accel } = columns.triads;
         if accel.is_none() || gyro.is_some() || columns.time.is_some() {
-            let expected = format!("at least {FEWEST_ROWS}, or the means of some positions");
-            let advice = "Record a run with dwells and turns, or give a table of accelerometer means, a row a position.";
+            let expected =
+                format!("at least {FEWEST_ROWS}, or the mean values of several positions");
+            let advice = "Record a run with dwells and turns, or give a table of accelerometer means with one row per \
+                          position.";
             return Err(FileError::of(file, found, expected, advice));
         }
         draft.of_means = true;
         Ok(draft)
     }
 
-    /// Whether the gravity direction stays the same, as in the log of one position.
+    /// Whether the gravity direction never changes, as in a log of one position.
     pub fn is_of_one_position(&self) -> bool {
         let stays = |motion: &Motion| !motion.is_turned && motion.cuts.is_empty();
         self.motion.as_ref().is_some_and(stays)
     }
 
-    /// Takes the units of another log of the same sensor.
+    /// Adopts the units of another log of the same sensor.
     ///
     /// # Errors
-    /// [`FileError`] if the columns are not those of the other log.
+    /// Returns [`FileError`] if the columns differ from those of the other log.
     pub fn as_in(&mut self, file: &Path, other: &Self) -> Result<(), FileError> {
         let names = |of: &Self| of.columns.names.join(", ");
         if self.columns.names != other.columns.names {
@@ -165,7 +172,8 @@ impl Draft {
         Ok(())
     }
 
-    /// Leaves out gyros whose unit nothing shows: gravity alone calibrates the accelerometers.
+    /// Leaves out the gyros if their unit cannot be determined; the accelerometers are then calibrated with gravity
+    /// alone.
     pub fn leave_out_gyros(&mut self) {
         let knows = |sensor| self.quantities.units.get(sensor).word.is_some();
         if !knows(Sensor::Gyro) && knows(Sensor::Accel) && self.columns.triads.accel.is_some() {
@@ -177,7 +185,7 @@ impl Draft {
     /// in the draft.
     ///
     /// # Errors
-    /// [`FileError`] if a file cannot be read, has too few rows, or lacks its triad or its time.
+    /// Returns [`FileError`] if a file cannot be read, has too few rows, or lacks its triad or a time.
     pub fn of_two_files(
         gyro: &DataFile,
         accel: &DataFile,
@@ -196,11 +204,10 @@ impl Draft {
             Some(_) => None,
             None => retain_instance(&mut sheet),
         };
-        let mut columns = Columns::find(&sheet);
+        let mut columns = columns_of(&mut sheet);
         columns.state(&stated.columns);
         retain_samples(&mut sheet, &columns);
         let clock = Clock::find(&sheet, &mut columns);
-        let standing = columns::standing_time(&sheet).filter(|_| clock.period.is_none());
         let rates = Rates {
             sheet: &sheet,
             columns: &columns,
@@ -208,24 +215,12 @@ impl Draft {
             written,
         };
         let has_times = streams.as_ref().is_some_and(|of| of.time.is_some());
-        let agreed = if has_times {
+        let (clock, contradiction) = if has_times {
             (clock, None)
         } else {
             rates.agreed(clock)
         };
-        let (clock, contradiction) = match agreed {
-            (clock, None) => (
-                clock,
-                standing.map(|(name, value)| {
-                    [
-                        format!("{value} in all rows of the column `{name}`"),
-                        "times that increase".to_owned(),
-                        "Log the time of each row, or set --rate.".to_owned(),
-                    ]
-                }),
-            ),
-            told => told,
-        };
+        let contradiction = contradiction.or_else(|| no_time(&sheet, &columns, &clock));
         let rows = rates.rows(&clock);
         let down = rows.as_ref().and_then(RawSamples::points_down);
         let mut draft = Self {
@@ -271,7 +266,8 @@ impl Draft {
         let of_units = || self.quantities.contradiction(&self.stated, &motion, period);
         let exchanged = || self.are_exchanged(rows, sheet).then(|| self.exchanged());
         let contradiction = self.contradiction.clone().or_else(of_units);
-        self.contradiction = contradiction.or_else(exchanged);
+        let contradiction = contradiction.or_else(exchanged);
+        self.contradiction = contradiction.or_else(|| self.without_gravity(&motion));
         self.quantities.state(&self.stated);
         self.random_walk = self.noise_at_rest(rows, &motion).unwrap_or_default();
         self.offset = rows.offset;
@@ -300,6 +296,24 @@ impl Draft {
         }
     }
 
+    /// Evidence, statement and remedy if the accelerometers do not measure gravity in the unit that the file states.
+    fn without_gravity(&self, motion: &Motion) -> Option<[String; 3]> {
+        let unit = &self.quantities.units.accel;
+        let is_rate = self.quantities.output == Output::Rate;
+        let word = unit.word.filter(|_| is_rate && !unit.is_shown)?;
+        let at_rest = motion.gravity / unit_scale(Sensor::Accel, word)?;
+        (at_rest < LITTLE * STANDARD_GRAVITY).then(|| {
+            [
+                format!(
+                    "{} m/s² at rest in the columns of the accelerometers",
+                    rounded(at_rest, 3)
+                ),
+                "gravity".to_owned(),
+                "Log accelerations with gravity, not linear or user accelerations.".to_owned(),
+            ]
+        })
+    }
+
     fn exchanged(&self) -> [String; 3] {
         let names = PerSensor::from_fn(|sensor| {
             let names = self.columns.triads.get(sensor).iter().flatten();
@@ -307,8 +321,11 @@ impl Draft {
             names.collect::<Vec<_>>().join(" ")
         });
         [
-            format!("gravity in {} and turns in {}", names.gyro, names.accel),
-            "rates and accelerations, as these columns are named".to_owned(),
+            format!(
+                "gravity in the columns {} and turns in the columns {}",
+                names.gyro, names.accel
+            ),
+            "rates and accelerations, according to the column names".to_owned(),
             "Exchange the two triads in the header of the log, or in columns of run.toml."
                 .to_owned(),
         ]
@@ -336,9 +353,46 @@ impl Draft {
     }
 }
 
-/// Angle in rad per gyro unit in one row, from the rotation of gravity; negative if the triads have opposite signs.
+/// Angle in rad for one gyro unit in one row, determined from the rotation of gravity; negative if the triads have
+/// opposite signs.
 pub fn turned_angle(triads: PerSensor<Vec<Vector3<f64>>>, period: f64) -> Option<f64> {
     RawSamples::new(triads, Vec::new(), period).motion().angle
+}
+
+/// Evidence, statement and remedy if the only time never changes or falls.
+fn no_time(sheet: &Sheet, columns: &Columns, clock: &Clock) -> Option<[String; 3]> {
+    if let Some(name) = columns::falling_time(sheet).filter(|_| columns.time.is_none()) {
+        return Some([
+            format!("times in the column `{name}` that fall from row to row"),
+            "times that increase".to_owned(),
+            "The newest row is first: reverse the rows below the names.".to_owned(),
+        ]);
+    }
+    let (name, value) = columns::standing_time(sheet).filter(|_| clock.period.is_none())?;
+    Some([
+        format!("{value} in all rows of the column `{name}`"),
+        "times that increase".to_owned(),
+        "Log the time of each row, or give the sample rate with --rate.".to_owned(),
+    ])
+}
+
+/// The columns of a log. Rows that repeat the row above are dropped if they hide the time, as erased memory does.
+fn columns_of(sheet: &mut Sheet) -> Columns {
+    let columns = Columns::find(sheet);
+    if columns.time.is_some() {
+        return columns;
+    }
+    let mut new = sheet.clone();
+    new.retain(|of, row| {
+        let is_new = |of: &Vec<f64>| of[row] != of[row - 1];
+        row == 0 || of.columns.iter().any(is_new)
+    });
+    let of_new = Columns::find(&new);
+    if of_new.time.is_none() {
+        return columns;
+    }
+    *sheet = new;
+    of_new
 }
 
 /// Keeps the rows of one of several instruments; returns the column and the number that identify it.

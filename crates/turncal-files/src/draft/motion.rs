@@ -1,4 +1,5 @@
-//! Motion from raw samples of unknown unit: dwells, magnitude of gravity, and gyro rotation from the gravity direction.
+//! Motion computed from raw samples of unknown unit: dwells, magnitude of gravity, and gyro rotation compared with the
+//! gravity direction.
 
 use std::ops::Range;
 
@@ -28,7 +29,7 @@ const AT_CUT: usize = 3;
 pub const FOLLOWED: f64 = 0.08;
 /// Specific force gives the direction of gravity if its magnitude is within this fraction of gravity.
 const NEAR_GRAVITY: f64 = 0.1;
-/// Scale tolerance of data sheets.
+/// Tolerance of scale factors stated in data sheets.
 pub const TOLERANCE: f64 = 0.03;
 /// Number of samples summed to distinguish pulses, which carry fractions, from readings.
 const SUM: usize = 16;
@@ -38,19 +39,20 @@ const SUM: usize = 16;
 pub struct Motion {
     /// The longest stretch at rest.
     pub longest_rest: Range<usize>,
-    /// Specific force at rest, in the quantity of the file per row.
+    /// Specific force at rest, in the file's quantity per row.
     pub gravity: f64,
-    /// Mean gyro output at rest.
+    /// Mean gyro output when the sensor is at rest.
     pub rest: Vector3<f64>,
     /// Whether the gravity direction changes.
     pub is_turned: bool,
-    /// Whether nothing moves but at these jumps.
+    /// Whether the sensor is always at rest, apart from jumps of the gravity direction.
     pub stands: bool,
-    /// Angle in rad per gyro unit in one row, if determined by turns; negative if the triads have opposite signs.
+    /// Angle in rad for one gyro unit in one row, if the turns determine it; negative if the triads have opposite
+    /// signs.
     pub angle: Option<f64>,
     /// Samples before which the gravity direction jumps, as in concatenated sections.
     pub cuts: Vec<usize>,
-    /// Variance of sums of samples at rest, relative to independent samples; smallest axis.
+    /// Variance of sums of samples at rest, relative to that of independent samples; the smallest value of all axes.
     pub sum_variance: Option<f64>,
 }
 
@@ -71,7 +73,7 @@ fn noise(means: &[Vector3<f64>]) -> f64 {
 }
 
 impl Motion {
-    /// Motion from samples; rows are missing before the samples in `breaks`.
+    /// Computes the motion from samples; rows are missing before the samples in `breaks`.
     pub fn find(samples: &PerSensor<Vec<Vector3<f64>>>, breaks: &[usize], period: f64) -> Self {
         let length = ((WINDOW / period).round() as usize).clamp(1, samples.gyro.len().div_ceil(8));
         let gyro = means(&samples.gyro, length);
@@ -204,7 +206,7 @@ fn turn_about(axis: &Vector3<f64>, gyro: &[Vector3<f64>]) -> bool {
     change.abs() > student_limit(degrees, 0.5 * FALSE_ALARM) * sigma
 }
 
-/// Variance of sums of samples at rest, relative to independent samples; smallest axis.
+/// Variance of sums of samples at rest, relative to that of independent samples; the smallest value of all axes.
 fn sum_variance(samples: &PerSensor<Vec<Vector3<f64>>>, settled: &[Range<usize>]) -> Option<f64> {
     let ratio = |triad: &[Vector3<f64>], axis: usize| {
         let (mut of_sums, mut of_one) = (0.0, 0.0);

@@ -1,9 +1,9 @@
-//! Quantity, axis and unit from the name of a column.
+//! Determines quantity, axis and unit from the name of a column.
 
 use crate::quantity::{Of, spelled};
 use turncal::imu::Sensor;
 
-/// A `run.toml` unit, and the size of the file's unit expressed in it.
+/// A unit of `run.toml`, and the size of the file's unit in this unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unit {
     pub word: &'static str,
@@ -28,13 +28,13 @@ const TRIADS: [(Sensor, &[&str], &[&str]); 2] = [
 ];
 /// Parts of the names of other columns.
 #[rustfmt::skip]
-const OTHERS: [&str; 9] =
-    ["mag", "compass", "quat", "euler", "cov", "std", "bias", "orientation", "useracc"];
+const OTHERS: [&str; 10] =
+    ["mag", "compass", "quat", "euler", "cov", "std", "bias", "orientation", "useracc", "gravity"];
 
 /// A parsed name.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Name {
-    /// Letters and digits in lower case, without axis and unit.
+    /// Letters and digits of the name in lower case, without those of the axis and the unit.
     pub stem: String,
     /// The axis part.
     pub axis: Option<char>,
@@ -84,7 +84,7 @@ fn words(name: &str) -> Vec<String> {
 }
 
 impl Name {
-    /// For a column whose unit may be in a separate row.
+    /// Analyses the name of a column whose unit may be in a separate row.
     pub fn of_column(name: &str, unit_below: &str) -> Self {
         let mut of = Self::of(name);
         of.unit = of.unit.or_else(|| unit(unit_below));
@@ -122,8 +122,12 @@ impl Name {
         let single = words.iter().position(is_axis).filter(|_| words.len() > 1);
         let axis = single.and_then(|place| words.remove(place).chars().next());
         let whole = words.concat();
+        // With the unit of a triad, an axis alone is enough.
+        let is_row = found.is_some_and(|unit| matches!(unit.of, Of::Rows(..)));
+        let alone = whole.chars().next().filter(|_| is_row && is_axis(&whole));
         let apart = match axis {
             Some(axis) => Some((&*whole, axis)),
+            None if alone.is_some() => alone.map(|axis| ("", axis)),
             None => axis_at_end(&whole).or(axis_at_start(&whole)),
         };
         Self {
@@ -133,7 +137,7 @@ impl Name {
         }
     }
 
-    /// The triad according to the stem; if the stem fits both, the unit decides.
+    /// The triad to which the stem of the name belongs; if the stem fits both triads, the unit decides.
     pub fn sensor(&self) -> Option<Sensor> {
         if self.is_of_another_sensor() {
             return None;
@@ -141,13 +145,11 @@ impl Name {
         let names = |(_, parts, all): &&(Sensor, &[&str], &[&str])| {
             parts.iter().any(|part| self.stem.contains(part)) || all.contains(&&*self.stem)
         };
-        TRIADS
-            .iter()
-            .find(names)
-            .map(|(sensor, ..)| match self.unit.map(|unit| unit.of) {
-                Some(Of::Rows(of_unit, _)) => of_unit,
-                _ => *sensor,
-            })
+        let named = TRIADS.iter().find(names).map(|(sensor, ..)| *sensor);
+        match self.unit.map(|unit| unit.of) {
+            Some(Of::Rows(of_unit, _)) if named.is_some() || self.stem.is_empty() => Some(of_unit),
+            _ => named,
+        }
     }
 
     /// Whether the name belongs to neither a gyro nor an accelerometer.
@@ -156,7 +158,7 @@ impl Name {
         self.unit.is_some_and(is_magnetic) || OTHERS.iter().any(|other| self.stem.contains(other))
     }
 
-    /// Similarity to a time column; larger is more similar.
+    /// How similar the name is to the usual name of a time column; larger means more similar.
     pub fn is_time(&self) -> u8 {
         let whole = self.whole();
         let has = |parts: &[&str]| parts.iter().any(|part| whole.contains(part));
@@ -189,13 +191,14 @@ impl Name {
         self.unit.is_some_and(|unit| unit.of == Of::Time)
     }
 
-    /// Whether this column contains one part of a time split into two columns: whole seconds or fraction.
+    /// Whether this column contains one part of a time that is split into two columns: the whole seconds or the
+    /// fraction.
     pub fn is_part_of_time(&self, word: &str) -> bool {
         let unit = self.unit.or_else(|| unit(&self.whole()));
         unit.is_some_and(|unit| unit.word == word)
     }
 
-    /// Whether the column distinguishes several instruments.
+    /// Whether the values of the column distinguish several instruments.
     pub fn is_instance(&self) -> bool {
         let names = [
             "i", "id", "instance", "imu", "imuid", "device", "deviceid", "sensorid",
@@ -203,7 +206,12 @@ impl Name {
         names.contains(&&*self.whole())
     }
 
-    /// Tick in s, if the name defines it.
+    /// Whether the column counts the ticks of a clock.
+    pub fn is_in_ticks(&self) -> bool {
+        self.whole().contains("tick")
+    }
+
+    /// Duration of a tick in s, if the name defines it.
     pub fn tick(&self) -> Option<f64> {
         // Xsens, MT Low-Level Communication Protocol: 10 kHz.
         (self.whole() == "sampletimefine").then_some(1e-4)

@@ -1,4 +1,5 @@
-//! Prior: scale and bias from the recording; the rest is typical of instruments with similar noise.
+//! The prior in a draft: scale and bias are estimated from the recording, and the other values are typical of
+//! instruments with similar noise.
 
 use nalgebra::Vector3;
 
@@ -67,7 +68,7 @@ impl Class {
 }
 
 impl Stated {
-    /// An instrument with outputs in rad/s and m/s², if its noise is stated.
+    /// An instrument whose outputs are in rad/s and m/s², if its noise is stated.
     pub fn instrument(&self) -> Option<Instrument> {
         let noise = self.noise?;
         let class = Class::of(|sensor| Some(noise.get(sensor).random_walk));
@@ -85,7 +86,7 @@ impl Stated {
 }
 
 impl Draft {
-    /// The prior of a triad: stated, from a data sheet, or typical of its class.
+    /// The prior of a triad: stated by the user, from a data sheet, or typical of its class.
     pub fn prior(&self, sensor: Sensor, remarks: &mut Remarks) -> PriorFile {
         let class = Class::of(|sensor| self.white_noise(sensor));
         let unit = self.quantities.units.get(sensor);
@@ -96,7 +97,7 @@ impl Draft {
             Some(of) => format!("from the data sheet of {}", of.of),
             None => {
                 let class = class.name;
-                format!("typical for {class} instrument; check against the data sheet")
+                format!("typical value for {class} instrument; compare it with the data sheet")
             }
         };
         let table = format!("imu.prior.{}", sensor.name());
@@ -141,7 +142,7 @@ impl Draft {
         let (zero, off, why) = if is_own {
             (rest, 0.0, "mean output at rest")
         } else {
-            let why = "output of an unsigned register at zero input";
+            let why = "the output of an unsigned register at zero input";
             (Vector3::zeros(), rest.amax(), why)
         };
         remarks.reason(&format!("{table}.bias"), why);
@@ -159,9 +160,9 @@ impl Draft {
 /// Meaning of a scale factor that the log does not show.
 fn open_scale(sensor: Sensor) -> &'static str {
     sensor.pick(
-        "counts per rad/s from the data sheet: 57.29578 times the counts per deg/s, which are often 131, 65.5, 32.8 or \
-         16.4; it could not be estimated from the change of gravity direction",
-        "counts per m/s² from the data sheet: counts per g divided by 9.80665; it could not be estimated from gravity at \
-         rest",
+        "counts per rad/s from the data sheet: 57.29578 times the counts per deg/s, which are often 131, 65.5, 32.8 \
+         or 16.4; turncal could not estimate this value from the change of gravity direction",
+        "counts per m/s² from the data sheet: counts per g divided by 9.80665; turncal could not estimate this value \
+         from gravity at rest",
     )
 }

@@ -1,5 +1,5 @@
-//! The clock after all that tells the rate is held against each other: stamps in their unit, the stated rate, the rate in
-//! the preamble, and turns in the unit of the gyros.
+//! Chooses the clock of a log by comparing all evidence about the rate: the time stamps in their unit, the stated rate,
+//! the rate in the preamble, and the turns in the unit of the gyros.
 
 use super::columns::Columns;
 use super::motion::{FOLLOWED, Motion};
@@ -13,12 +13,12 @@ use crate::instrument::{RATE_SIGMA, USUAL_PERIOD, USUAL_SCALE};
 use turncal::imu::Sensor;
 use turncal::number::rounded;
 
-/// Statements about the rate of a log.
+/// Information about the rate of a log.
 pub struct Rates<'a> {
     pub sheet: &'a Sheet,
     pub columns: &'a Columns,
     pub stated: &'a Stated,
-    /// Rate in the preamble, Hz.
+    /// Rate stated in the preamble, Hz.
     pub written: Option<f64>,
 }
 
@@ -27,7 +27,7 @@ fn are_near(one: f64, other: f64, factor: f64) -> bool {
 }
 
 impl Rates<'_> {
-    /// The rows of a clock.
+    /// The rows to which a clock applies.
     pub fn rows(&self, clock: &Clock) -> Option<RawSamples> {
         let (numbers, triads) = self.columns.samples(self.sheet)?;
         let period = clock.period.unwrap_or(USUAL_PERIOD);
@@ -35,8 +35,8 @@ impl Rates<'_> {
         Some(RawSamples::new(triads, breaks, period))
     }
 
-    /// The clock that most statements allow, with a doubt if one of the file is given up; and the evidence against a
-    /// statement of the user, the statement and the remedy.
+    /// Returns the clock that agrees with most of the information, with a doubt if information in the file was
+    /// rejected. Also returns the evidence against information from the user, with this information and the remedy.
     pub fn agreed(&self, clock: Clock) -> (Clock, Option<[String; 3]>) {
         let told = clock.period.zip(self.shown(&clock));
         let contradiction = (self.stated.rate_hz).and_then(|rate| clock.contradiction(rate));
@@ -68,7 +68,7 @@ impl Rates<'_> {
         let of_turns = |[found, stated, _]: [String; 3]| {
             let turned = rounded(shown.recip(), 3);
             [
-                format!("{found}, and turns that fit the unit of the gyros at {turned} Hz"),
+                format!("{found}, and turns that fit the unit of the gyros only at {turned} Hz"),
                 stated,
                 "Correct --rate, or state the unit of the gyros with --gyro-unit.".to_owned(),
             ]
@@ -113,7 +113,7 @@ impl Rates<'_> {
         let times = rounded(shown * rate, 3);
         Some([
             format!(
-                "turns that fit the unit of the gyros only at {turned} Hz, where a row lasts {times} times as long"
+                "turns that fit the unit of the gyros only at {turned} Hz, so that a row lasts {times} times as long"
             ),
             format!("{rate} Hz, as stated"),
             format!("State --rate {turned}, or the unit of the gyros with --gyro-unit."),
@@ -129,8 +129,8 @@ impl Rates<'_> {
             Some((written, of_stamps)) => Clock {
                 certainty: Certainty::Guess,
                 doubt: Some(format!(
-                    "The preamble of the log states {written} Hz, its time stamps {} Hz, and no turn tells which is \
-                     right. turncal used the time stamps. State --rate.",
+                    "The preamble of the log states {written} Hz and its time stamps {} Hz; no turn shows which of \
+                     the two rates is right. turncal used the time stamps. State --rate.",
                     rounded(of_stamps, 4)
                 )),
                 ..clock

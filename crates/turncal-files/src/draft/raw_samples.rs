@@ -1,4 +1,4 @@
-//! Rows of both triads as signed numbers about the nominal zero of their registers.
+//! Rows of both triads as signed numbers, relative to the nominal zero of their registers.
 
 use nalgebra::Vector3;
 
@@ -8,10 +8,10 @@ use turncal::imu::{PerSensor, Sensor};
 /// Codes of a register of 16 bits.
 const CODES: f64 = 65_536.0;
 
-/// Rows of both triads minus the nominal register zero.
+/// Rows of both triads after subtraction of the nominal register zero.
 pub struct RawSamples {
     pub triads: PerSensor<Vec<Vector3<f64>>>,
-    /// Indices of rows that follow a gap.
+    /// Indices of the rows that follow a gap.
     pub breaks: Vec<usize>,
     /// Sample period, s.
     pub period: f64,
@@ -47,7 +47,7 @@ impl RawSamples {
         Motion::find(&self.triads, &self.breaks, self.period)
     }
 
-    /// The motion if the two triads were swapped.
+    /// The motion that would result if the two triads were swapped.
     pub fn exchanged(&self) -> Motion {
         let PerSensor { gyro, accel } = &self.triads;
         let triads = PerSensor {
@@ -57,7 +57,7 @@ impl RawSamples {
         Motion::find(&triads, &self.breaks, self.period)
     }
 
-    /// The axis with mostly negative specific force in the first rows.
+    /// The axis whose specific force is negative in most of the first rows.
     pub fn points_down(&self) -> Option<usize> {
         let accel = &self.triads.accel;
         let rows = ((WINDOW / self.period).round() as usize).clamp(1, accel.len().max(1));
@@ -65,7 +65,7 @@ impl RawSamples {
         (0..3).find(|&axis| force[axis] < -0.9 * force.norm())
     }
 
-    /// Reasons why count columns cannot be used unchanged.
+    /// Reasons why columns of counts cannot be used unchanged.
     pub fn unfit(&self) -> Vec<String> {
         let wrapped = Sensor::ALL.into_iter().filter(|&of| *self.wrapped.get(of));
         let why = |sensor: Sensor| {
@@ -79,7 +79,7 @@ impl RawSamples {
     }
 }
 
-/// Half the range of a register of whole numbers with its zero in the middle, if all values are around this middle.
+/// Half the range of an integer register whose zero is in the middle of the range, if all values are near this middle.
 pub fn offset(samples: &[Vector3<f64>]) -> Option<f64> {
     let values = || samples.iter().flat_map(|sample| sample.iter().copied());
     if values().any(|value| value.fract() != 0.0) {

@@ -1,4 +1,4 @@
-//! Selection of the streams or files of the instrument.
+//! Selects the streams or files that contain the data of the instrument.
 
 use super::columns::{self, Columns, by_stem};
 use super::name::Name;
@@ -22,19 +22,19 @@ use turncal_logs::{DataFile, Source, streams};
 pub struct Streams {
     /// Content of the log, one line per stream.
     listed: Vec<String>,
-    /// The gyro stream, and the accelerometer stream if separate.
+    /// The gyro stream and, if it is separate, the accelerometer stream.
     pub gyro: String,
     pub accel: Option<String>,
-    /// Time columns and units, if there are two streams.
+    /// Time columns and their units, if there are two streams.
     pub time: Option<PerSensor<(String, String)>>,
     /// Column names in the log.
     pub names: Vec<String>,
     remarks: Vec<String>,
-    /// Body axes of the program.
+    /// Body axes used by the program that wrote the log.
     pub axes: Option<&'static str>,
     /// The first damage.
     pub damage: Option<FileError>,
-    /// The accelerometer file, if both triads are rows of text.
+    /// The accelerometer file, if both triads are in text files.
     pub written: Option<Written>,
 }
 
@@ -42,7 +42,7 @@ pub struct Streams {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Written {
     pub accel: Option<String>,
-    /// Whether the gyros are in this file, and the accelerometers in the log.
+    /// Whether the gyros are in this file and the accelerometers are in the log.
     pub is_exchanged: bool,
 }
 
@@ -69,7 +69,7 @@ struct Member {
 }
 
 impl Streams {
-    /// Examines a log; `None` for a text with a single stream.
+    /// Examines a log; returns `None` for a text with a single stream.
     pub fn of_file(
         file: &DataFile,
         wanted: Option<&str>,
@@ -120,8 +120,8 @@ impl Streams {
         Ok(Some((streams, sheet)))
     }
 
-    /// Examines the files of both triads, as written by phones and `ulog2csv`, or one file with separate rows; a
-    /// separate accelerometer file has this name in the draft.
+    /// Examines the files of both triads, as written by phones and `ulog2csv`, or one file with separate rows; `name`
+    /// is the name of a separate accelerometer file in the draft.
     pub fn of_two_files(
         gyro: &DataFile,
         accel: &DataFile,
@@ -194,7 +194,7 @@ impl Streams {
         }
     }
 
-    /// States the selected streams in `[imu]`, after the content of the log.
+    /// Writes the selected streams into `[imu]`, below comments that describe the content of the log.
     pub fn describe(&self, imu: &mut ImuFile, remarks: &mut Remarks) {
         if self.written.is_none() {
             for line in &self.listed {
@@ -218,8 +218,7 @@ impl Streams {
             {
                 std::mem::swap(&mut imu.file, other);
             }
-            let why =
-                "accelerometers use their own clock; --with time-offset estimates the difference";
+            let why = "the accelerometers have their own clock; --with time-offset estimates the difference";
             remarks.reason("imu.accel_from", why);
         }
         for remark in &self.remarks {
@@ -228,7 +227,8 @@ impl Streams {
         if let Some(damage) = self.damage.as_ref().filter(|_| self.written.is_none()) {
             let damage = one_line(&damage.to_string());
             imu.salvage = Some(true);
-            let why = format_args!("uncomment to use the intact part. {damage}");
+            let why =
+                format_args!("uncomment this line to use the intact part of the file. {damage}");
             remarks.open("imu.salvage", why);
         }
     }
@@ -422,6 +422,15 @@ fn tagged(file: &DataFile) -> Result<Vec<Member>, FileError> {
             ..Source::of_file(file.clone())
         };
         let mut sheet = Sheet::of(source.open()?, 1)?;
+        if let Some((column, number)) = columns::instance(&sheet) {
+            let name = &sheet.names[column];
+            return Err(FileError::of(
+                file,
+                format_args!("several instruments in the rows `{tag}`, by the column `{name}`"),
+                "the rows of one instrument",
+                &format!("Keep the rows of one, such as those with {name} = {number}."),
+            ));
+        }
         let mut member = Member::of_stream(file, rows_as_stream(&tag, &sheet));
         sheet.names = names(&member.found);
         let columns = Columns::find(&sheet);
@@ -439,7 +448,13 @@ fn tagged(file: &DataFile) -> Result<Vec<Member>, FileError> {
         }
         Ok(member)
     };
-    CsvFile::tags(file)?.into_iter().map(of_tag).collect()
+    // Rows that only comment on others need not be regular.
+    let members = CsvFile::tags(file)?.into_iter().map(of_tag);
+    let (read, refused): (Vec<_>, Vec<_>) = members.partition(Result::is_ok);
+    let is_inertial = |of: &Member| of.triads != PerSensor::default();
+    let is_enough = read.iter().flatten().any(is_inertial) || refused.is_empty();
+    let members = if is_enough { read } else { refused };
+    members.into_iter().collect()
 }
 
 /// Rows of a text as a stream.

@@ -167,7 +167,10 @@ fn counts_get_the_data_sheets_scale_from_gravity_and_its_turns() {
     );
     // Of another sign than the accelerometers, and no data sheet's.
     let text = counts(|count| (-1.1 * count).round());
-    has(&text, &["scale = 918.", "# Gravity rotates opposite"]);
+    has(
+        &text,
+        &["scale = 918.", "# Gravity rotates in the opposite"],
+    );
 }
 
 #[test]
@@ -221,7 +224,7 @@ fn registers_without_names_and_time_are_told_by_their_numbers() {
         &text,
         &[
             "columns = { gyro = [\"4\", \"5\", \"6\"], accel = [\"1\", \"2\", \"3\"] }",
-            "# TODO: no column rises steadily, as times do",
+            "# TODO: no column increases steadily, as a time does",
         ],
     );
 }
@@ -444,7 +447,7 @@ fn a_counter_that_other_packets_share_is_no_time_and_a_compass_no_gyro() {
     has(
         &text,
         &[
-            "# a counter shared with other packets is not a time; the sample period is estimated from the turns",
+            "# a counter shared with other packets cannot serve as a time; the sample period is estimated from the turns",
             "columns = { gyro = [\"%float(RawGyroX)\", \"%float(RawGyroY)\", \"%float(RawGyroZ)\"], \
              accel = [\"%float(RawAccelX)\", ",
         ],

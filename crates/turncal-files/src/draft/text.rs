@@ -20,8 +20,8 @@ use turncal_input::{Finite, Gravity, Height, Latitude, NonNegative, Positive};
 type NoiseFields = BTreeMap<String, Option<NonNegative>>;
 
 impl Draft {
-    /// The draft as a `run.toml` with this name for the log. Lines with `TODO` must be completed before it can be read;
-    /// the others are guesses, each with its reason.
+    /// The draft as the text of a `run.toml` in which the log has this name. Lines with `TODO` must be completed before
+    /// the file can be read; the other lines are guesses, each with its reason.
     pub fn to_toml(&self, file: &str) -> String {
         let (run, remarks) = self.run_file(file);
         page::text(FORMAT, &run, &remarks)
@@ -35,7 +35,7 @@ impl Draft {
             None => "the log alone".to_owned(),
         };
         let remark = format_args!(
-            "Draft made from {of_it}. Check the guesses and complete the open fields, then run `turncal check`."
+            "Draft made from {of_it}. Check the guesses and complete the open fields; then run `turncal check`."
         );
         remarks.before("format", remark);
         let run = RunFile {
@@ -45,9 +45,9 @@ impl Draft {
         };
         let of_table = match &self.columns.quaternion {
             Some(four) => format!(
-                "{} form a quaternion. If it comes from a turntable (body right-front-up to East-North-Up, order w, \
-                 x, y, z), add a [turntable] that reads this file. Do not use an attitude computed by the instrument \
-                 itself.",
+                "{} form a quaternion. If it comes from a turntable (body right-front-up to East-North-Up, order w, x, \
+                 y, z), add a [turntable] that reads this file. Do not use this attitude if the instrument itself \
+                 computed it.",
                 self.list(four)
             ),
             None => "If you have a turntable log, add [turntable] with file, columns, position_sigma_arcsec and \
@@ -59,7 +59,7 @@ impl Draft {
     }
 
     fn site(&self, remarks: &mut Remarks) -> SiteFile {
-        let remark = "location of the instrument; missing fields get a wide σ";
+        let remark = "location of the instrument; if a field is missing, turncal uses a wide σ";
         remarks.before("site", remark);
         let mut field = |key: &str, value: Option<f64>, why: &str| {
             let path = format!("site.{key}");
@@ -70,7 +70,7 @@ impl Draft {
             value
         };
         let (of, latitude) = (&self.stated, "north positive; 0.1° is accurate enough");
-        let gravity = "if measured; otherwise normal gravity is used";
+        let gravity = "if measured; otherwise turncal uses normal gravity";
         SiteFile {
             latitude_deg: field("latitude_deg", of.latitude_deg, latitude).map(Latitude),
             height_m: field("height_m", of.height_m, "above the ellipsoid").map(Height),
@@ -107,20 +107,21 @@ impl Draft {
             streams.describe(&mut imu, remarks);
         }
         remarks.reason("imu.output", &found.output_why);
-        let why = "1σ of the rate, which no time stamps confirm; it is part of the σ of the gyro scale factors";
+        let why = "1σ of the sample rate, because no time stamps confirm it; the σ of the gyro scale factors include \
+        this uncertainty";
         remarks.reason("imu.sample_period_sigma_ppm", why);
         if found.opposed {
             remarks.before(
                 "imu.time_unit",
-                "Gravity rotates opposite to the gyro output, so one triad has the wrong sign. Negate its columns or \
-                 give it a negative scale.",
+                "Gravity rotates in the opposite direction to the gyro output, so one triad has the wrong \
+                 sign. Reverse the signs of its columns, or give it a negative scale.",
             );
         }
         remarks.reason("imu.time_unit", &clock.why);
         let why = "guess: a row covers the interval that ends at its time stamp; otherwise \"start\" or \"middle\"";
         remarks.reason("imu.time_stamp", why);
         remarks.reason("imu.continuous", self.why_continuous());
-        let why = "the log contains several instruments; this selects the first";
+        let why = "the log contains several instruments; this value selects the first";
         remarks.reason("imu.instance", why);
         imu
     }
@@ -137,7 +138,9 @@ impl Draft {
             Some(_) => remarks.reason(&path, why),
             None => remarks.open(
                 &path,
-                format_args!("{why}; see the data sheet or the logger"),
+                format_args!(
+                    "{why}; for the value, see the data sheet or the settings of the logger"
+                ),
             ),
         }
         unit.word.map(str::to_owned)
@@ -147,7 +150,7 @@ impl Draft {
         let (path, clock) = ("imu.sample_period_s", &self.clock);
         let Some(period) = clock.period else {
             if !self.rows_show_period() {
-                let why = "seconds between rows; a counter does not give them";
+                let why = "time between rows in s, which a counter does not show";
                 remarks.open(path, why);
             }
             return None;
@@ -156,7 +159,8 @@ impl Draft {
         if clock.is_stated {
             remarks.reason(path, format_args!("{rate} Hz, stated in the file"));
         } else {
-            let why = format!("{rate} Hz; estimated from the time column if omitted");
+            let why =
+                format!("{rate} Hz; if this field is omitted, estimated from the time column");
             remarks.suggestion(path, why);
         }
         Some(Positive(rounded(period, 7)))
@@ -176,11 +180,12 @@ impl Draft {
             (0, 0, 0) => "no gaps".to_owned(),
             (0, 0, repeated) => {
                 let repeated = places(repeated);
-                format!("no gaps, but time repeats or steps back in {repeated}")
+                format!("there are no gaps, but the time repeats or steps back in {repeated}")
             }
             (0, gaps, _) => format!("rows are missing in {}", places(gaps)),
             (cuts, ..) => format!(
-                "gravity direction jumps in {}, as in concatenated sections; otherwise set true",
+                "the gravity direction jumps in {}, as it does between concatenated sections; if the log is \
+                 continuous, set this field to true",
                 places(cuts)
             ),
         }
@@ -202,7 +207,9 @@ impl Draft {
             remarks.reason(path, AXES_OF_PROGRAM);
             return axes;
         }
-        let mut why = "guess: x right, y front, z up; otherwise \"frd\" or \"flu\"".to_owned();
+        let mut why =
+            "guess: x right, y front, z up; otherwise set this field to \"frd\" or \"flu\""
+                .to_owned();
         if is_of_autopilot(&self.columns.names) {
             why += "; the column names are those of PX4 or ArduPilot, which use \"frd\"";
         }
@@ -245,8 +252,8 @@ impl Draft {
                 (None, None) => remarks.open_before(path, why()),
                 (None, Some(_)) => {
                     let without = sensor.pick(
-                        "without them only the accelerometers can be calibrated",
-                        "without them only `turncal allan` can use the log",
+                        "without these columns, only the accelerometers can be calibrated",
+                        "without these columns, only `turncal allan` can use the log",
                     );
                     remarks.before(path, format_args!("{}; {without}", why()));
                 }
@@ -278,7 +285,8 @@ impl Draft {
             let words = self.doubt_words(doubt);
             remarks.before("imu.columns", format_args!("Guess: {words}"));
         } else if columns.by_size && columns.triads.gyro.is_some() {
-            let why = "The triads were identified by their values: the gyros turn the vector of the accelerometers.";
+            let why = "The triads were identified by their values: turns of the gyros rotate the vector of the \
+            accelerometers.";
             remarks.before("imu.columns", why);
         }
         if let Some((down, accel)) = self.down.zip(columns.triads.accel) {
@@ -292,7 +300,7 @@ impl Draft {
         }
     }
 
-    /// Why the triads that were identified by value are a guess, and what to check.
+    /// Reasons why triads that were identified by their values are only a guess, and what to check.
     pub fn doubt_words(&self, doubt: &Doubt) -> String {
         match doubt {
             Doubt::Order(order) => {
@@ -302,17 +310,18 @@ impl Draft {
                 let order: Vec<String> = order.iter().map(signed).collect();
                 let gyro = toml::Value::from(order);
                 format!(
-                    "gravity turns as with gyro = {gyro}; check the order of the axes in the logger"
+                    "the change of gravity is consistent with gyro = {gyro}; check the order of the axes in the logger"
                 )
             }
             Doubt::Rival(rival) => {
                 let [gyro, accel] = [rival.gyro, rival.accel].map(|triad| self.list(&triad));
                 format!(
-                    "gyro = {gyro} with accel = {accel} fits as well; check the columns in the logger"
+                    "gyro = {gyro} with accel = {accel} fits equally well; check the columns in the logger"
                 )
             }
             Doubt::NoTurns => {
-                "no turn of gravity compares the columns; check them in the logger, or record turns"
+                "the log contains no turns with which to compare the columns; check the columns in the logger, or \
+                 record turns"
                     .to_owned()
             }
         }
@@ -322,9 +331,9 @@ impl Draft {
     fn without_time(&self, remarks: &mut Remarks) {
         let (path, why) = ("imu.columns", &self.clock.why);
         let instead = if self.clock.is_stated {
-            "turncal takes the rows as consecutive."
+            "turncal assumes that the rows are consecutive."
         } else if self.rows_show_period() {
-            "the sample period is estimated from the turns unless sample_period_s is set."
+            "turncal estimates the sample period from the turns unless sample_period_s is set."
         } else {
             let words = format_args!("{why}; name a time column or set sample_period_s.");
             return remarks.open_before(path, words);
@@ -335,8 +344,8 @@ impl Draft {
     /// Remark that an axis points down or that the accelerometers output gravity.
     pub fn down_words(&self, down: usize) -> String {
         format!(
-            "{} is negative: the axis points down, or the accelerometers output gravity instead of specific force, \
-             as iOS does",
+            "{} is negative: either the axis points down, or the accelerometers output gravity instead of specific \
+             force, as on iOS",
             self.columns.names[down]
         )
     }
@@ -344,7 +353,7 @@ impl Draft {
     fn noise_fields(&self, remarks: &mut Remarks) -> NoiseFields {
         remarks.before(
             "imu.noise",
-            "white noise; turncal estimates it from the recording unless it is stated",
+            "white noise; if this field is omitted, turncal estimates the noise from the recording",
         );
         let mut fields = NoiseFields::new();
         for sensor in Sensor::ALL.into_iter().filter(|&of| self.is_present(of)) {
@@ -355,7 +364,10 @@ impl Draft {
             let (key, unit) = NoiseKeys::of(sensor).random_walk;
             let walk = self.white_noise(sensor);
             let why = match walk {
-                Some(_) => "measured at rest in this log; prefer a data sheet or turncal allan",
+                Some(_) => {
+                    "measured at rest in this log; a value from the data sheet or from turncal allan is more \
+                accurate"
+                }
                 None => "value from the data sheet",
             };
             remarks.suggestion(&format!("imu.noise.{key}"), why);
@@ -376,7 +388,7 @@ impl Draft {
         priors
     }
 
-    /// White noise of a triad, stated or at rest, (rad/s)√s or (m/s²)√s.
+    /// White noise of a triad, as stated or as measured at rest, in (rad/s)√s or (m/s²)√s.
     pub fn white_noise(&self, sensor: Sensor) -> Option<f64> {
         if let Some(noise) = &self.stated.noise {
             return Some(noise.get(sensor).random_walk);
@@ -398,7 +410,7 @@ fn stated_noise(fields: &mut NoiseFields, remarks: &mut Remarks, sensor: Sensor,
     if let Some(bias) = noise.gauss_markov {
         let (key, unit) = keys.gauss_markov;
         state(key, bias.sigma / unit, "as stated");
-        let why = "chosen here, because a random walk has no correlation time";
+        let why = "chosen by turncal, because a random walk has no correlation time";
         state(keys.correlation_time, bias.correlation_time, why);
     }
 }

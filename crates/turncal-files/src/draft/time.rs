@@ -1,5 +1,6 @@
 //! The clock of a log.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use super::columns::Columns;
@@ -11,24 +12,27 @@ use turncal::number::rounded;
 use turncal::statistics::median;
 use turncal_logs::clock::Uniform;
 
-/// Plausible sample periods, s (5 kHz to 5 Hz): units that differ by 1000 cannot both be plausible.
+/// Plausible sample periods, s (5 kHz to 5 Hz): two units that differ by a factor of 1000 cannot both be plausible.
 pub const PERIODS: std::ops::Range<f64> = 2e-4..0.2;
-/// Steps within this factor match a stated rate.
+/// Time steps and a stated rate agree if they differ by less than this factor.
 pub const STATED: f64 = 1.2;
+const DAY: f64 = 86_400.0;
+/// Most rows by which a row that comes late is out of order.
+const FARTHEST: f64 = 100.0;
 
 /// Certainty of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Certainty {
-    /// Stated in the log and confirmed by motion, determined by motion alone, or stated by the user.
+    /// The value is stated in the log and confirmed by motion, determined by motion alone, or stated by the user.
     Certain,
-    /// Stated in the log or typical, but not confirmed by motion.
+    /// The value is stated in the log or is typical, but motion does not confirm it.
     Guess,
-    /// Neither stated nor confirmed.
+    /// The value is neither stated nor confirmed.
     Unknown,
 }
 
 impl Certainty {
-    /// The certainty in one word.
+    /// The degree of certainty in one word.
     pub fn word(self) -> &'static str {
         match self {
             Self::Certain => "certain",
@@ -38,48 +42,54 @@ impl Certainty {
     }
 }
 
-/// Clock detected in the time column.
+/// Clock detected from the time column.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Clock {
-    /// The word or number for `time_unit`.
+    /// The word or number for the field `time_unit`.
     pub unit: String,
     /// Reason and certainty.
     pub why: String,
     pub certainty: Certainty,
     /// Sample period in s, if known.
     pub period: Option<f64>,
-    /// Whether the period is stated in the file rather than derived from times.
+    /// Whether the period is stated in the file and not derived from times.
     pub is_stated: bool,
-    /// Steps longer than the usual one.
+    /// Number of time steps that are longer than the usual step.
     pub gaps: Vec<Gap>,
-    /// Steps that do not increase.
+    /// Rows at which the clock was restarted.
+    pub restarts: Vec<usize>,
+    /// Number of steps at which the time does not increase.
     pub repeated: usize,
     /// Mean step of the time column, in its unit.
     pub step: Option<f64>,
-    /// Relative 1σ of the period, if it is not that of time stamps.
+    /// Relative 1σ of the period, if it is not determined by time stamps.
     pub sigma: f64,
-    /// Reason to doubt it.
+    /// Reason to doubt the clock.
     pub doubt: Option<String>,
 }
 
 impl Clock {
-    /// Examines the time column, and drops it if it is a counter that other packets share.
+    /// Examines the time column, and drops it if it is a counter shared with other packets.
     pub fn find(sheet: &Sheet, columns: &mut Columns) -> Self {
         let stated = sheet.rate.map(f64::recip);
         let Some((column, stamps)) = columns.time.zip(columns.stamps(sheet)) else {
-            return Self::without(stated, "no column rises steadily, as times do");
+            return Self::without(stated, "no column increases steadily, as a time does");
         };
         let steps = Steps::of(&stamps);
         let name = Name::of_column(&sheet.names[column], &sheet.units[column]);
         if name.is_counter() && name.is_time() < 2 && !steps.is_count {
             columns.time = None;
-            return Self::without(stated, "a counter shared with other packets is not a time");
+            return Self::without(
+                stated,
+                "a counter shared with other packets cannot serve as a time",
+            );
         }
         let second = |word: &str| units_of_time().find(|of| of.0 == word);
         let named = (name.unit).and_then(|unit| Some(unit.times * second(unit.word)?.1));
         let tick = name.tick().map(|tick| tick * steps.mean);
         let known = stated.or(tick.filter(|period| PERIODS.contains(period)));
-        let seconds = || units_of_time().map(|(_, second)| second);
+        // Spreadsheets count days.
+        let seconds = || units_of_time().map(|(_, second)| second).chain([DAY]);
         let usual = rounded(steps.mean, 6);
         let mut sigma = 0.0;
         let (second, why) = if columns.nanoseconds.is_some() {
@@ -104,6 +114,13 @@ impl Clock {
             let likely = seconds().find(is_usual).unwrap_or(1.0);
             (Some(likely), format!("steps of {usual}"))
         };
+        let is_open = named.is_none() && known.is_none() && name.is_in_ticks();
+        let doubt_of_ticks = is_open.then(|| {
+            format!(
+                "The length of a tick in the column `{}` is not stated. turncal assumed the most usual one. State --rate.",
+                sheet.names[column]
+            )
+        });
         let word = |second: f64| units_of_time().find(|of| (second / of.1 - 1.0).abs() < 1e-9);
         Self {
             unit: second.map_or("count".to_owned(), |second| match word(second) {
@@ -118,6 +135,7 @@ impl Clock {
             period: second.map(|second| steps.mean * second).or(stated),
             is_stated: second.is_none() && stated.is_some(),
             gaps: steps.gaps,
+            restarts: steps.restarts,
             repeated: steps.repeated,
             step: Some(steps.mean),
             sigma: if second.is_none() && stated.is_some() {
@@ -125,11 +143,11 @@ impl Clock {
             } else {
                 sigma
             },
-            doubt: None,
+            doubt: doubt_of_ticks,
         }
     }
 
-    /// A clock whose rate is off by this much more than its σ, if it is not that of time stamps or has a rival.
+    /// A clock whose rate has this uncertainty, if no time stamps determine the rate or if another rate is possible.
     pub fn within(self, off: f64, has_rival: bool) -> Self {
         let is_doubted = self.sigma > 0.0 || has_rival;
         let sigma = if is_doubted {
@@ -140,7 +158,8 @@ impl Clock {
         Self { sigma, ..self }
     }
 
-    /// The clock with rows of this period and its relative 1σ instead of its own; with a doubt unless the user states it.
+    /// A copy of the clock with this row period and its relative 1σ. The copy contains a doubt, unless the user stated
+    /// the rate.
     pub fn given_up(self, period: f64, sigma: f64, is_doubted: bool) -> Self {
         let [rate, former] =
             [Some(period), self.period].map(|of| of.map(|of| rounded(of.recip(), 4)));
@@ -155,8 +174,9 @@ impl Clock {
             .filter(|_| self.unit != "count")
             .map(|step| rounded(period / step, 7));
         let doubt = format!(
-            "The clock of the log is doubtful: turns fit the unit of the gyros only if a row lasts {times} times as long as \
-             at {former} Hz ({}; {}). turncal used {rate} Hz{}. State --rate, or --gyro-unit if that is wrong.",
+            "The clock of the log is doubtful: the turns fit the unit of the gyros only if a row lasts {times} times \
+             as long as at {former} Hz ({}; {}). turncal used {rate} Hz{}. State --rate, or --gyro-unit if the unit is \
+             wrong.",
             self.unit,
             self.why,
             tick.map_or(String::new(), |tick| format!(", a tick of {tick:?} s")),
@@ -173,14 +193,16 @@ impl Clock {
         }
     }
 
-    /// Indices of the samples that follow a gap longer than `seconds`.
+    /// Indices of the samples that follow a gap longer than `seconds`, or a restart of the clock.
     pub fn breaks(&self, rows: &[usize], period: f64, seconds: f64) -> Vec<usize> {
         let long = |gap: &&Gap| gap.missing * period > seconds;
-        let first = |gap: &Gap| rows.partition_point(|&row| row < gap.before);
-        self.gaps.iter().filter(long).map(first).collect()
+        let gaps = self.gaps.iter().filter(long).map(|gap| gap.before);
+        let all: BTreeSet<usize> = gaps.chain(self.restarts.iter().copied()).collect();
+        let first = |before: usize| rows.partition_point(|&row| row < before);
+        all.into_iter().map(first).collect()
     }
 
-    /// Evidence, statement and remedy if the steps of a time contradict a stated rate.
+    /// Evidence, stated value and remedy, if the steps of a time column contradict a stated rate.
     pub fn contradiction(&self, rate: f64) -> Option<[String; 3]> {
         let found = self.period?.recip();
         let (hertz, unit, why) = (rounded(found, 6), &self.unit, &self.why);
@@ -201,6 +223,7 @@ impl Clock {
             period,
             is_stated: period.is_some(),
             gaps: Vec::new(),
+            restarts: Vec::new(),
             repeated: 0,
             step: None,
             sigma: period.map_or(0.0, |_| RATE_SIGMA),
@@ -209,7 +232,7 @@ impl Clock {
     }
 }
 
-/// A step longer than the usual one.
+/// A time step that is longer than the usual step.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Gap {
     /// The row after the step.
@@ -227,6 +250,7 @@ struct Steps {
     /// Whether steps are whole numbers, mostly one.
     is_count: bool,
     gaps: Vec<Gap>,
+    pub restarts: Vec<usize>,
     repeated: usize,
 }
 
@@ -247,6 +271,8 @@ impl Steps {
         let clock = || Uniform::new(Path::new(""), &rows, None).ok();
         let clock = (!forward.is_empty()).then(clock).flatten();
         let numbers = clock.as_ref().map_or(&[][..], |clock| &clock.numbers);
+        // Rows out of order are close to one another.
+        let is_restart = |(_, step): &(usize, f64)| *step < -FARTHEST * usual;
         let gap = |(row, pair): (usize, &[usize])| {
             let missing = pair[1].saturating_sub(pair[0] + 1) as f64;
             (missing > 0.0).then_some(Gap {
@@ -259,6 +285,11 @@ impl Steps {
             is_count: usual == 1.0 && is_whole,
             is_whole,
             gaps: numbers.windows(2).enumerate().filter_map(gap).collect(),
+            restarts: (1..)
+                .zip(steps())
+                .filter(is_restart)
+                .map(|(row, _)| row)
+                .collect(),
             repeated,
         }
     }

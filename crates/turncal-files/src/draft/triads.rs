@@ -1,8 +1,9 @@
-//! Triads identified by their values: gyros turn the vector that accelerometers measure.
+//! Identification of triads by their values: the gyros predict the rotation of the vector that the accelerometers
+//! measure.
 //!
-//! Between windows of rows a specific force f changes by Δf = −s (w − w₀) × (f − c) with the gyros w, their zero w₀ and
-//! the zero c of the accelerometers. Every pair of triads, in every order and with every sign of the gyro axes, is a
-//! hypothesis; they are compared by their likelihoods on the same rows.
+//! From one window of rows to the next, the specific force f changes by Δf = −s (w − w₀) × (f − c), where w is the gyro
+//! output, w₀ its zero, and c the zero of the accelerometers. Every pair of triads, in every order and with every sign
+//! of the gyro axes, is a hypothesis; they are compared by their likelihoods on the same rows.
 
 mod fit;
 
@@ -27,21 +28,21 @@ const UNEVEN: f64 = 0.2;
 /// Raw accelerometers measure gravity within this factor.
 const TOLERANCE: f64 = 1.25;
 
-/// Identified triads, the likeliest first, and the reasons why they are a guess.
+/// The identified triads, the most likely ones first, and the reasons why they are only a guess.
 #[derive(Default)]
 pub struct Identified {
     pub triads: PerSensor<Vec<Triad>>,
     pub doubt: Option<Doubt>,
 }
 
-/// Why triads are a guess.
+/// Reason why triads are only a guess.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Doubt {
     /// The gyro columns in the order of the accelerometer axes, with their signs.
     Order([(usize, f64); 3]),
-    /// Other triads that fit as well.
+    /// Other triads that fit equally well.
     Rival(PerSensor<Triad>),
-    /// No turns that compare the triads.
+    /// The log contains no turns with which to compare the triads.
     NoTurns,
 }
 
@@ -66,7 +67,7 @@ pub fn overlap(a: &Triad, b: &Triad) -> bool {
 }
 
 impl Identified {
-    /// The triads among these candidates.
+    /// Identifies the triads among these candidates.
     pub fn find(columns: &[Vec<f64>], candidates: &PerSensor<Vec<Triad>>) -> Self {
         let rows = columns.first().map_or(0, Vec::len);
         let lengths = (0..).map(|power| 1 << power);
@@ -203,7 +204,7 @@ fn is_gravity(columns: &[Vec<f64>], triad: &Triad) -> bool {
     factors.into_iter().any(is_near)
 }
 
-/// Standard deviation of the logarithm of the magnitude.
+/// Standard deviation of the logarithm of the magnitude of a triad.
 pub fn uneven(columns: &[Vec<f64>], triad: &Triad) -> f64 {
     let sizes = magnitudes(columns, triad);
     let logarithms: Vec<f64> = sizes
@@ -242,7 +243,7 @@ fn are_copies(columns: &[Vec<f64>], a: &Triad, b: &Triad) -> bool {
     !overlap(a, b) && { pairs }.all(|(&a, &b)| likeness(&columns[a], &columns[b]) > 0.5)
 }
 
-/// Triads of neighbours among these places, but none across two copies that follow each other.
+/// Candidate triads of adjacent columns, except those that extend over two successive copies of a triad.
 pub fn consecutive(columns: &[Vec<f64>], places: &[usize]) -> Vec<Triad> {
     let mut all: Vec<Triad> = places.windows(3).map(|of| [of[0], of[1], of[2]]).collect();
     let mut copies: Vec<Triad> = Vec::new();

@@ -1,4 +1,4 @@
-//! Rotation of the gyros in a unit of their rows, from the gravity direction before, during and after moves.
+//! Size of the gyro unit, determined from the gravity direction before, during and after moves.
 
 use std::f64::consts::TAU;
 
@@ -6,7 +6,7 @@ use nalgebra::{Rotation3, Vector3};
 
 use turncal::units::DEGREE;
 
-/// Smaller changes of the gravity direction are not used, rad.
+/// Changes of the gravity direction smaller than this angle are not used, rad.
 pub const ENOUGH: f64 = 20.0 * DEGREE;
 /// The shortest move that changes the gravity direction is at most two turns.
 const MOST: f64 = 2.0 * TAU;
@@ -18,16 +18,16 @@ const STEP: f64 = 1.03;
 const FINER: i32 = 20;
 /// Trials within this factor of the best count as the best.
 const SAME: f64 = 1.25;
-/// Largest square error of a fitting unit, relative to the error without rotation.
+/// Largest accepted squared error of a unit, relative to the error without rotation.
 pub const GOOD: f64 = 0.1;
 /// Factor by which other units fit worse.
 const TOLD_APART: f64 = 3.0;
 
 /// A short interval of a log.
 pub struct Interval {
-    /// Rotation in the unit of the gyros times rows.
+    /// Rotation angle, in the unit of the gyros times rows.
     pub rotation: Vector3<f64>,
-    /// Direction of gravity, if the specific force has its magnitude.
+    /// Direction of gravity, if the specific force has the same magnitude as gravity.
     pub up: Option<Vector3<f64>>,
     pub is_at_rest: bool,
     /// Whether rows are missing before the end of the interval.
@@ -86,7 +86,8 @@ fn moves(intervals: &[Interval]) -> Vec<Move<'_>> {
     moves
 }
 
-/// Angle in rad per gyro unit in one row, negative if the triads have opposite signs; `None` if moves do not show it.
+/// Angle in rad for one gyro unit in one row; negative if the triads have opposite signs, `None` if the moves do not
+/// determine it.
 pub fn angle(intervals: &[Interval]) -> Option<f64> {
     let mut moves = moves(intervals);
     let turned = moves.iter().filter(|of| of.is_turned());

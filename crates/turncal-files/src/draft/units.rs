@@ -20,17 +20,17 @@ use turncal::number::rounded;
 /// Sums of pulses vary less than sums of readings by more than this factor.
 const PULSE_SUMS: f64 = 0.5;
 
-/// Unit of a triad, as far as known.
+/// Unit of a triad, as far as it is known.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Unit {
-    /// Name in `run.toml`, if known.
+    /// Name in `run.toml`, if it is known.
     pub word: Option<&'static str>,
     pub why: String,
     /// Whether the unit is confirmed by motion or stated by the user.
     pub is_shown: bool,
-    /// Whether rows that are not whole numbers fit no known unit.
+    /// Whether the rows fit no known unit, or fit a unit other than the one stated in the file.
     pub is_unfit: bool,
-    /// Scale of counts, if determined.
+    /// Scale of the counts, if it could be determined.
     pub scale: Option<Scale>,
 }
 
@@ -43,7 +43,7 @@ impl Unit {
     }
 }
 
-/// Quantity of the rows.
+/// Quantity in the rows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Quantities {
     pub output: Output,
@@ -54,12 +54,14 @@ pub struct Quantities {
 }
 
 impl Quantities {
-    /// The quantities if there are too few numeric rows.
+    /// The quantities to assume if there are too few numeric rows.
     pub fn unknown() -> Self {
         Self {
             output: Output::Rate,
             output_why: "as in most logs".to_owned(),
-            units: PerSensor::from_fn(|_| Unit::open("too few numeric rows to tell")),
+            units: PerSensor::from_fn(|_| {
+                Unit::open("there are too few numeric rows to determine the units")
+            }),
             opposed: false,
         }
     }
@@ -133,9 +135,13 @@ impl Quantities {
         if sensor == Sensor::Accel {
             self.hold(chosen.output, rows);
         }
+        // Gravity alone overrules a stated unit of accelerometers; turns need the clock as well.
+        let is_overruled =
+            sensor == Sensor::Gyro && by_name.is_some_and(|of| of.word != chosen.word);
         Unit {
             word: Some(chosen.word),
             is_shown: chosen.fits(),
+            is_unfit: is_overruled,
             ..Unit::open(&why)
         }
     }
@@ -145,15 +151,16 @@ impl Quantities {
         self.output = output;
         self.output_why = match output {
             Output::Pulse => {
-                "integer counts whose remainder is carried into the next row, as in pulse outputs"
+                "the values are whole counts, and the remainder of each row is carried into the next, as in pulse \
+                 outputs"
                     .into()
             }
             Output::Increment => {
                 let period = rounded(rows.period, 4);
-                format!("specific force at rest is g times {period} s per row")
+                format!("the specific force at rest is g times {period} s per row")
             }
             Output::Rate => {
-                "specific force at rest is g itself, not g times the sample period".into()
+                "the specific force at rest is g, not g times the sample period".into()
             }
         };
     }
@@ -214,9 +221,9 @@ impl Quantities {
             }
             None if is_bare && self.output != Output::Pulse => {
                 return Unit::open(if rows.motion.is_turned {
-                    "too few usable turns of gravity to estimate it"
+                    "there are too few usable turns to estimate the unit"
                 } else {
-                    "gravity direction does not change, so it cannot be estimated"
+                    "the gravity direction does not change, so the unit cannot be estimated"
                 });
             }
             _ => {}
@@ -242,7 +249,7 @@ impl Quantities {
         }
     }
 
-    /// The first stated unit that motion contradicts, if motion confirms another: evidence, statement, remedy.
+    /// The first stated unit that the motion contradicts while it confirms another unit: evidence, stated unit, remedy.
     pub fn contradiction(
         &self,
         stated: &Stated,
@@ -303,7 +310,8 @@ impl Quantities {
         self.units.get(sensor).word == Some("count")
     }
 
-    /// The period for which turns fit the unit of the gyros, stated, in the file or found; for rates.
+    /// For rates: the sample period for which the turns fit the unit of the gyros, and whether this unit is stated,
+    /// named in the file or detected.
     pub fn turned_period(
         &self,
         stated: &Stated,
@@ -320,7 +328,7 @@ impl Quantities {
         Some(angle.abs() * per_si)
     }
 
-    /// Factor that converts rows to rates.
+    /// Factor that converts row values to rates.
     pub fn per_second(&self, period: f64) -> f64 {
         match self.output {
             Output::Rate => 1.0,
@@ -361,7 +369,9 @@ fn why_count(rows: &TriadRows, unfit: &str) -> String {
         _ if rows.whole => "whole numbers".to_owned(),
         Some(unit) => {
             let unit = unit.word;
-            format!("{unit} is not a built-in unit, so it is a count with a scale")
+            format!(
+                "{unit} is not a built-in unit, so turncal treats it as a count with this scale"
+            )
         }
         None => unfit.to_owned(),
     }

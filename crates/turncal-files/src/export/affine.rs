@@ -1,4 +1,5 @@
-//! Calibrations as other programs apply them: one matrix and one offset per triad, and the residual errors.
+//! Calibrations in the form in which other programs apply them: one matrix and one offset per triad, and the residual
+//! errors.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -18,13 +19,13 @@ impl Affine {
         Self::diagonal(Vector3::repeat(1.0), offset)
     }
 
-    /// A program with a factor and an offset per axis.
+    /// A program that applies a factor and an offset to each axis.
     pub fn diagonal(factor: Vector3<f64>, offset: Vector3<f64>) -> Self {
         let matrix = Matrix3::from_diagonal(&factor);
         Self { matrix, offset }
     }
 
-    /// The complete correction of a triad.
+    /// The complete correction for a triad.
     pub fn complete(triad: &Normalised) -> Self {
         Self {
             matrix: triad.inverse,
@@ -60,7 +61,7 @@ impl Residual {
         Sensor::ALL.into_iter().map(of).filter(exceeds).collect()
     }
 
-    /// Size of the residual error, as a sentence.
+    /// A sentence with the size of the residual error.
     pub fn words(&self) -> String {
         let scale = self.errors.diagonal().amax();
         let mut across = self.errors;
@@ -81,8 +82,8 @@ impl Residual {
             ),
         };
         format!(
-            "{name}: the residual error is up to {:.1} ppm in scale and {:.1} arcsec in misalignment ({example} in any \
-             direction combined), and {bias} in bias",
+            "{name}: the remaining error is up to {:.1} ppm in scale, {:.1} arcsec in misalignment ({example} if both \
+             are combined in any direction), and {bias} in bias",
             scale / PPM,
             across.amax() / ARCSEC
         )

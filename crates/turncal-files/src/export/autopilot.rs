@@ -1,4 +1,4 @@
-//! Parameters for PX4, ArduPilot, Betaflight and INAV: offsets, and accelerometer scales.
+//! Parameters for PX4, ArduPilot, Betaflight and INAV: offsets, and scales of the accelerometers.
 //!
 //! PX4 and ArduPilot compute `(n − offset) ⊙ scale` for accelerometers and `n − offset` for gyros, in sensor axes, and
 //! then rotate to body axes (`SENS_BOARD_ROT`, `AHRS_ORIENTATION`). INAV and Betaflight do the same in whole counts.
@@ -6,8 +6,8 @@
 //! Source: PX4-Autopilot, `src/lib/sensor_calibration` and `src/modules/temperature_compensation`; ArduPilot,
 //! `AP_InertialSensor_Backend.cpp`, `_rotate_and_correct_accel`, and `AP_InertialSensor_tempcal.cpp`, `correct_sensor`;
 //! Betaflight, `acceleration.c`, `applyAccelerationTrims`; INAV, `acceleration.c`, `applyAccelerationZero`, and
-//! `gyro.c`, `gyro_zero_x`. PX4 skips thermal parameters whose `TC_G0_ID`, `TC_A0_ID` is not the device's:
-//! `TemperatureCompensation::set_sensor_id`.
+//! `gyro.c`, `gyro_zero_x`. PX4 skips thermal parameters whose `TC_G0_ID` or `TC_A0_ID` is not the identity of the
+//! device: `TemperatureCompensation::set_sensor_id`.
 
 use nalgebra::Vector3;
 
@@ -18,7 +18,7 @@ use turncal::imu::{AXES, PerSensor, Sensor};
 use turncal::units::{DEGREE, STANDARD_GRAVITY};
 
 const UPPER: [&str; 3] = ["X", "Y", "Z"];
-const UNCORRECTED: &str = "gyro scale factors and all misalignments";
+const UNCORRECTED: &str = "gyro scale factors, and all misalignments";
 /// Reference temperature of ArduPilot, °C, and the factor of its coefficients.
 const ARDUPILOT_REFERENCE: f64 = 35.0;
 const ARDUPILOT_FACTOR: f64 = 1e6;
@@ -60,7 +60,7 @@ fn px4_lines(parameters: Parameters) -> String {
     parameters.into_iter().map(line).collect()
 }
 
-/// PX4's temperature: `n − (X0 + X1 d + X2 d² + X3 d³)`, d = T − TREF, before `CAL_*` are applied.
+/// Temperature correction of PX4: `n − (X0 + X1 d + X2 d² + X3 d³)`, d = T − TREF, before `CAL_*` are applied.
 pub fn px4(values: &Values) -> Exported {
     let program = single(values);
     let names = ["CAL_GYRO0_#OFF", "CAL_ACC0_#OFF", "CAL_ACC0_#SCALE"];
@@ -68,12 +68,12 @@ pub fn px4(values: &Values) -> Exported {
     // PX4 compares the identities with those of its drivers, which no log of samples holds.
     let thermal = values.record.temperature.iter();
     let ids = match &values.record.temperature {
-        None => "CAL_GYRO0_ID and CAL_ACC0_ID: set them to the device_id",
+        None => "CAL_GYRO0_ID and CAL_ACC0_ID: set both to the device_id",
         Some(_) => "CAL_GYRO0_ID = TC_G0_ID and CAL_ACC0_ID = TC_A0_ID: set them to the device_id",
     };
     let ids = format!(
-        "{ids} that `listener sensor_gyro` and `listener sensor_accel` show; PX4 ignores the other parameters without \
-         them"
+        "{ids} that `listener sensor_gyro` and `listener sensor_accel` show; without it, PX4 ignores the other \
+         parameters"
     );
     for (thermal, sensor) in thermal.flat_map(|thermal| Sensor::ALL.map(|sensor| (thermal, sensor)))
     {
@@ -97,13 +97,13 @@ pub fn px4(values: &Values) -> Exported {
     Remarks::of_program(values, reads, &program, &[UNCORRECTED, &ids]).above(&text)
 }
 
-/// ArduPilot's temperature: `n − p(T) + p(T_cal)` before the offsets are subtracted, with `p(T) = (c₁ d + c₂ d² + c₃
-/// d³) 10⁻⁶`, d = T − 35 °C.
+/// Temperature correction of ArduPilot: `n − p(T) + p(T_cal)` before the offsets are subtracted, with `p(T) = (c₁ d +
+/// c₂ d² + c₃ d³) 10⁻⁶`, d = T − 35 °C.
 pub fn ardupilot(values: &Values) -> Exported {
     let program = single(values);
     let notes = [
         UNCORRECTED,
-        "instance number: the second instance uses INS_ACC2OFFS_X and so on",
+        "instance number: for the second instance, use INS_ACC2OFFS_X and so on",
         "permanent gyro offsets: ArduPilot re-estimates them at every start unless INS_GYR_CAL is 0",
     ];
     let lines = |parameters: Parameters| -> String {
@@ -144,7 +144,8 @@ fn counts(v: &Vector3<f64>, per_unit: f64) -> Vector3<f64> {
 
 fn of_counts(what: &str, counts: f64, unit: &str) -> String {
     format!(
-        "counts are for {what} with {counts:.0} counts per {unit}; for n counts per {unit}, multiply by n / {counts:.0}"
+        "the counts are for {what} with {counts:.0} counts per {unit}; if yours has n counts per {unit}, multiply the \
+         values by n / {counts:.0}"
     )
 }
 
@@ -156,19 +157,23 @@ pub fn betaflight(values: &Values) -> Exported {
         gyro: Affine::offset(Vector3::zeros()),
         accel: Affine::offset(zero / per_unit),
     };
-    let notes = ["all gyro parameters, because it zeroes the gyros at every start"];
-    let reads = ("#", "commands for its command line, from rad/s and m/s^2");
+    let notes = ["all gyro parameters, because Betaflight zeroes the gyros at every start"];
+    let reads = (
+        "#",
+        "commands for the Betaflight command line, computed from rad/s and m/s^2",
+    );
     let [x, y, z] = [zero.x, zero.y, zero.z].map(|count| count as i64);
     Remarks::of_program(values, reads, &program, &notes)
         .defines([
             of_counts("an accelerometer", COUNTS_PER_G, "g"),
-            "for a log recorded with acc_calibration = 0,0,0,0: Betaflight subtracts it before it logs".to_owned(),
+            "these values are for a log recorded with acc_calibration = 0,0,0,0, because Betaflight subtracts \
+             acc_calibration before logging".to_owned(),
         ])
         .above(&format!("set acc_calibration = {x},{y},{z},1\nsave\n"))
 }
 
-/// INAV computes `(counts − acczero) accgain / 4096` for accelerometers; gyro zeros are used if it does not estimate
-/// them.
+/// INAV computes `(counts − acczero) accgain / 4096` for accelerometers; INAV uses the gyro zeros unless it estimates
+/// them itself.
 pub fn inav(values: &Values) -> Exported {
     let PerSensor { gyro, accel } = &values.triads;
     let per_unit = COUNTS_PER_G / STANDARD_GRAVITY;
@@ -189,13 +194,16 @@ pub fn inav(values: &Values) -> Exported {
         ("gyro_zero", &gyro_zero),
     ];
     let text = all.map(|(name, values)| set(name, values)).concat();
-    let reads = ("#", "commands for its command line, from rad/s and m/s^2");
+    let reads = (
+        "#",
+        "commands for the Betaflight command line, computed from rad/s and m/s^2",
+    );
     Remarks::of_program(values, reads, &program, &[UNCORRECTED])
         .defines([
             of_counts("an accelerometer", COUNTS_PER_G, "g"),
             of_counts("gyros", COUNTS_PER_RAD_S, "rad/s"),
-            "for a log recorded with acczero and gyro_zero = 0, accgain = 4096 and init_gyro_cal = OFF: INAV applies \
-             them before it logs"
+            "these values are for a log recorded with acczero and gyro_zero = 0, accgain = 4096 and init_gyro_cal = \
+             OFF, because INAV applies its own values before logging"
                 .to_owned(),
         ])
         .above(&(text + "set init_gyro_cal = OFF\nsave\n"))

@@ -24,8 +24,8 @@ pub fn write(values: &Values) -> Exported {
         at_temperature(values),
         test_vectors(values)
     );
-    let functions = "raw: N, gyros x y z, accelerometers x y z; calibrated: u in the same order; they may be the same \
-        array; each test vector holds raw, then calibrated";
+    let functions = "raw: N, gyros x y z, accelerometers x y z; calibrated: u in the same order; raw and calibrated \
+    may be the same array; each test vector contains the raw values, then the calibrated values";
     Remarks::new(values, "//", &[SIGMA])
         .defines(equation(values))
         .defines([functions.to_owned()])
@@ -80,8 +80,9 @@ fn polynomial_words(values: &Values) -> Option<String> {
         format!("{} to {} degC", range.lowest, range.highest)
     });
     Some(format!(
-        "turncal_calibrate_at, at a constant temperature in degC: include <math.h> first; rows of ..._of_t: value at the \
-         reference temperature, then coefficients of powers 1 to 5; valid for {gyro} (gyros), {accel} (accelerometers)"
+        "turncal_calibrate_at, for a constant temperature in degC: include <math.h> first; each row of ..._of_t \
+         contains the value at the reference temperature, then the coefficients of the powers 1 to 5; valid for \
+         {gyro} (gyros), {accel} (accelerometers)"
     ))
 }
 

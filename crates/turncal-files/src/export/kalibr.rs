@@ -3,7 +3,7 @@
 //! Source: Rehder et al., "Extending kalibr: calibrating the extrinsics of multiple IMUs and of individual axes", ICRA
 //! 2016; Kalibr, `kalibr_common/ConfigReader.py`, `ImuParameters`, and `IccSensors.py`, `IccScaledMisalignedImu`;
 //! OpenVINS, `VioManagerOptions::print_and_load_noise` and `print_and_load_state`, `StateOptions::print`,
-//! `Propagator::predict_and_compute`, and `YamlParser::parse_external`, which reads by `cv::FileStorage`.
+//! `Propagator::predict_and_compute`, and `YamlParser::parse_external`, which reads with `cv::FileStorage`.
 
 use nalgebra::Matrix3;
 
@@ -16,13 +16,12 @@ use turncal::units::ARCSEC;
 
 /// Quantities that Kalibr and OpenVINS estimate themselves.
 const BIASES: &str =
-    "biases, which it estimates itself, so they leave no error; a comment lists them";
-const TOPIC: &str = "rostopic of your recording, which you must write in place of /imu0";
+    "the biases: Kalibr estimates them itself, so no error remains; a comment lists their values";
+const TOPIC: &str = "the rostopic of your recording, which you must enter in place of /imu0";
 
-/// From true to measured, in rad/s and m/s²: `a = M_a C_i_b f + b_a`,
-/// `ω = M_g C_gyro_i C_i_b ω_b + A C_gyro_i C_i_b f + b_g`, with both `M` lower triangular and both `C` rotations.
-/// `C_i_b`, in `T_i_b`, rotates the body frame of the calibration into the accelerometer axes, so K and E are
-/// represented completely.
+/// The model from true to measured values, in rad/s and m/s², is `a = M_a C_i_b f + b_a`, `ω = M_g C_gyro_i C_i_b ω_b +
+/// A C_gyro_i C_i_b f + b_g`, with both `M` lower triangular and both `C` rotations. `C_i_b`, in `T_i_b`, rotates the
+/// body frame of the calibration into the accelerometer axes, so K and E are represented completely.
 pub fn kalibr(values: &Values) -> Exported {
     let PerSensor { gyro, accel } = &values.triads;
     let (m_accel, imu_b) = lower(&accel.sensitivity);
@@ -47,11 +46,11 @@ accelerometers:
         rows(4, &gyro_imu),
         rows(4, &m_accel)
     );
-    let equations = "accelerometers measure M C_i_b f + bias, gyroscopes M C_gyro_i C_i_b w + A C_gyro_i C_i_b f + bias; \
-        Kalibr reads the first six keys only and starts from M = 1, A = 0, so give it the output of `turncal apply`";
+    let equations = "accelerometers measure M C_i_b f + bias, gyroscopes M C_gyro_i C_i_b w + A C_gyro_i C_i_b f + \
+    bias; Kalibr reads only the first six keys and starts from M = 1, A = 0, so give it the output of `turncal apply`";
     let frame = format!(
-        "T_i_b rotates the body frame into the accelerometer axes, {:.1} arcsec away; a program that assumes the \
-         identity gets u along those axes",
+        "T_i_b rotates the body frame by {:.1} arcsec into the accelerometer axes; in a program that assumes the \
+         identity, u is along the accelerometer axes",
         turncal::attitude::log(&imu_b).norm() / ARCSEC
     );
     remarks.defines([equations.to_owned(), frame]).above(&text)
@@ -76,7 +75,9 @@ fn configuration<'a>(values: &'a Values<'a>, program: &str, indent: &str) -> (St
         key(format!("{name}_noise_density"), triad.density(), &density);
         let (walk, is_usual) = triad.varying().unzip();
         let usual = match is_usual {
-            Some(true) => ", usual for this noise density; measure it with `turncal allan`",
+            Some(true) => {
+                ", the value that is usual for this noise density; measure the bias random walk with `turncal allan`"
+            }
             _ => "",
         };
         let unit = format!("{unit}/s/sqrt(Hz){usual}");
@@ -92,7 +93,7 @@ fn configuration<'a>(values: &'a Values<'a>, program: &str, indent: &str) -> (St
         .omitting(Values::missing(&missing, program))
         .reads(&format!("{program} reads rad/s and m/s^2"))
         .defines([format!(
-            "bias of gyroscopes: {gyro}, of accelerometers: {accel}"
+            "bias of the gyroscopes: {gyro}, of the accelerometers: {accel}"
         )]);
     (text, remarks)
 }

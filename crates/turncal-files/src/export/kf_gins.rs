@@ -1,7 +1,7 @@
 //! IMU section of a KF-GINS configuration.
 //!
-//! Along front, right, down, from true to measured: `n = (1 + s) u + b` axis by axis, with b in °/h and mGal, s in ppm.
-//! KF-GINS corrects by `u = (n − b) / (1 + s)`.
+//! The model from true to measured values, along the front, right and down axes, is `n = (1 + s) u + b` axis by axis,
+//! with b in °/h and mGal, s in ppm. KF-GINS corrects by `u = (n − b) / (1 + s)`.
 //!
 //! Source: the KF-GINS configuration file and its IMU compensation (GIEngine, i2Nav, Wuhan University).
 
@@ -28,11 +28,12 @@ pub fn write(values: &Values) -> Exported {
     });
     let omissions: [&str; 3] = [
         &format!(
-            "misalignment: up to {gyros} (gyros) and {accelerometers} (accelerometers) remain in the data; if that is \
-             too much, give KF-GINS the output of `turncal apply` with zero bias and scale"
+            "misalignment: up to {gyros} (gyros) and {accelerometers} (accelerometers) remain in the data; if this \
+             error is too large, give KF-GINS the output of `turncal apply` with zero bias and scale"
         ),
-        "sigma of misalignment, and covariance; they are in calibration.json",
-        "gsstd and asstd of imunoise, which KF-GINS requires: variation of scale factors in ppm, from the data sheet",
+        "sigma of the misalignment, and the covariance; both are in calibration.json",
+        "gsstd and asstd of imunoise, which KF-GINS requires: the variation of the scale factors in ppm, as stated in \
+         the data sheet",
     ];
     let PerSensor { gyro, accel } = &values.triads;
     let error = |triad: &Normalised| triad.sensitivity.diagonal().add_scalar(-1.0);
@@ -40,7 +41,7 @@ pub fn write(values: &Values) -> Exported {
     let [sigma, noise] = [sigma(values, &mut unstated), noise(values, &mut missing)];
     let unstated = (!unstated.is_empty()).then(|| {
         let names = unstated.join(", ");
-        format!("{names}: the calibration does not state sigma for all axes, so KF-GINS takes that of imunoise")
+        format!("{names}: the calibration does not state sigma for all axes, so KF-GINS uses the value of imunoise")
     });
     let text = format!(
         "\
@@ -54,7 +55,7 @@ initaccscale: {}  # ppm
         list(&(error(gyro) / PPM)),
         list(&(error(accel) / PPM))
     );
-    let sigma = "init...std: 1 sigma of the calibration; increase it if biases change at switch-on";
+    let sigma = "init...std: 1 sigma of the calibration; increase the value if the biases change at switch-on";
     Remarks::new(values, "#", &omissions)
         .omitting(unstated)
         .omitting(Values::missing(&missing, "KF-GINS"))
@@ -94,7 +95,7 @@ fn noise(values: &Values, missing: &mut Vec<String>) -> String {
     };
     let line = |name: &str, value: f64, unit: f64, unit_name: &str, is_usual: bool| {
         let usual = if is_usual {
-            ", usual for this white noise"
+            ", the value that is usual for this white noise"
         } else {
             ""
         };

@@ -30,9 +30,9 @@ use values::Values;
 pub struct Format {
     /// Name on the command line.
     pub name: &'static str,
-    /// Extension of its files.
+    /// Extension of the files in this format.
     pub extension: &'static str,
-    /// Programs that read it.
+    /// Programs that read this format.
     pub about: &'static str,
     axes: Axes,
     write: fn(&Values) -> Exported,
@@ -58,13 +58,14 @@ const fn row(
 }
 
 /// Temperature dependence that autopilots cannot represent.
-const IN_AUTOPILOTS: &str = "change of scale factors and misalignments with temperature, change of biases with \
-    temperature rate, and orders above three; biases refer to the temperature of the sensor";
+const IN_AUTOPILOTS: &str = "change of scale factors and misalignments with temperature, change of biases with the \
+temperature rate, and polynomial orders above three; the biases are functions of the temperature of the sensor";
 
 /// Every format.
 #[rustfmt::skip]
 pub static FORMATS: [Format; 14] = [
-    row("kalibr", "yaml", "IMU configuration for Kalibr, with intrinsics of model scale-misalignment", Log, kalibr::kalibr),
+    row("kalibr", "yaml", "IMU configuration for Kalibr, with the intrinsics of its model \
+    scale-misalignment", Log, kalibr::kalibr),
     row("kf-gins", "yaml", "IMU section of a KF-GINS configuration", FrontRightDown, kf_gins::write),
     row("c", "h", "A C99 header with constants and a function", RightFrontUp, code::write).with_temperature(""),
     row("text", "txt", "All values with name, σ and unit", RightFrontUp, text::write),
@@ -72,8 +73,8 @@ pub static FORMATS: [Format; 14] = [
         .with_temperature(IN_AUTOPILOTS),
     row("ardupilot", "param", "ArduPilot parameters: INS_GYROFFS, INS_ACCOFFS, INS_ACCSCAL", FrontRightDown,
         autopilot::ardupilot).with_temperature(IN_AUTOPILOTS),
-    row("open-vins-kalibr", "yaml", "IMU intrinsics for OpenVINS, model kalibr", Log, kalibr::open_vins_kalibr),
-    row("open-vins-rpng", "yaml", "IMU intrinsics for OpenVINS, model rpng", Log, kalibr::open_vins_rpng),
+    row("open-vins-kalibr", "yaml", "IMU intrinsics for OpenVINS, with its model kalibr", Log, kalibr::open_vins_kalibr),
+    row("open-vins-rpng", "yaml", "IMU intrinsics for OpenVINS, with its model rpng", Log, kalibr::open_vins_rpng),
     row("imu-calib", "yaml", "Accelerometer calibration for the ROS package imu_calib", Log, ros::imu_calib),
     row("ros-covariance", "yaml", "Covariances for ROS sensor_msgs/Imu, from the noise of a run", Log, ros::covariance),
     row("mat", "mat", "A MATLAB structure (MAT file)", RightFrontUp, mat::write),
@@ -97,11 +98,12 @@ impl Format {
     }
 }
 
-/// Writes a calibration in a format. A run of the same instrument gives noise figures, sample rate and the nominal
-/// scales by which counts are divided, for formats in rad/s and m/s².
+/// Writes a calibration in a given format. A run of the same instrument gives noise figures, sample rate and the
+/// nominal scales by which counts are divided, for formats in rad/s and m/s².
 ///
 /// # Errors
-/// If the calibration has no inverse or an unknown term, or does not belong to the instrument of the run.
+/// Returns an error if the calibration has no inverse, contains an unknown term, or does not belong to the instrument
+/// of the run.
 pub fn write(
     record: &Calibration,
     format: &Format,
@@ -113,8 +115,8 @@ pub fn write(
         let omitted = match format.of_temperature {
             Some(omitted) => omitted.to_owned(),
             None => format!(
-                "change with temperature; this is the calibration at {reference} °C (use --temperature-degc for \
-                 another temperature)"
+                "change with temperature; the values apply at {reference} °C (use --temperature-degc for another \
+                 temperature)"
             ),
         };
         let omitted = Some(omitted).filter(|note| !note.is_empty());

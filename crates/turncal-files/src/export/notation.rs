@@ -1,8 +1,8 @@
-//! Numbers and comments as text.
+//! Numbers and comments in the notation of a format.
 
 use nalgebra::{Dim, Matrix, RawStorage};
 
-/// Any text as a one-line comment; names and warnings come from files and may contain line breaks.
+/// Any text as a comment of one line; names and warnings come from files and may contain line breaks.
 pub fn comment(mark: &str, line: &str) -> String {
     let breaks = |c: char| c.is_control() || matches!(c, '\u{2028}' | '\u{2029}');
     let line = line.replace(breaks, " ");
@@ -34,7 +34,8 @@ pub fn list<'a>(values: impl IntoIterator<Item = &'a f64>) -> String {
     format!("[{}]", values.join(", "))
 }
 
-/// A matrix as a YAML list of rows, each a line indented by `indent`, which must be deeper than its key for OpenCV.
+/// A matrix as a YAML list of rows, one line each, indented by `indent`; for OpenCV, the indentation must be deeper
+/// than that of the key.
 pub fn rows<R: Dim, C: Dim>(
     indent: usize,
     matrix: &Matrix<f64, R, C, impl RawStorage<f64, R, C>>,

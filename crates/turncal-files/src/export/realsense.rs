@@ -1,4 +1,4 @@
-//! The memory of a RealSense D400 camera, which calibrates its output itself.
+//! The calibration memory of a RealSense D400 camera, which corrects its output itself.
 //!
 //! Source: librealsense, `tools/rs-imu-calibration/rs-imu-calibration.py`; `src/ds/ds-calib-parsers.cpp`,
 //! `dm_v2_imu_calib_parser::get_intrinsic`.
@@ -27,8 +27,8 @@ fn table([major, minor]: [u8; 2], kind: u16, content: &[u8]) -> Vec<u8> {
 pub fn write(values: &Values) -> Exported {
     let program = PerSensor::from_fn(|sensor| Affine::complete(values.triads.get(sensor)));
     let notes = [
-        "rotation and translation to the depth sensor, which keep their design values",
-        "the serial number after the table, which stays empty",
+        "the rotation and translation relative to the depth sensor, which keep their design values",
+        "the serial number that follows the table, which is left empty",
     ];
     let mut imu = vec![0xff; 37 * 4 + 96];
     // Intrinsics are set, extrinsics are not.

@@ -1,4 +1,4 @@
-//! Comments above the values of a format, one line each: instrument, definitions, omissions.
+//! Comments above the values in a file, one line each: instrument, definitions, omissions.
 
 use super::affine::{Affine, Residual};
 use super::notation::{comment, list};
@@ -7,15 +7,15 @@ use turncal::calibration::result::{Calibration, EQUATION, Method};
 use turncal::imu::{AxisOrder, PerSensor, Sensor, Term};
 use turncal::run::Aiding;
 
-/// Omission of nearly every format.
-pub const SIGMA: &str = "sigma and covariance of the parameters; they are in calibration.json";
+/// A part of the calibration that almost every format omits.
+pub const SIGMA: &str = "sigma and covariance of the parameters; both are in calibration.json";
 
 /// A calibration in a format.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Exported {
     /// Text of the file.
     pub bytes: Vec<u8>,
-    /// Omissions of the format, one sentence each, which are also in the file.
+    /// Omissions of the format, one sentence each; the file states them too.
     pub notes: Vec<String>,
 }
 
@@ -31,7 +31,7 @@ pub struct Remarks<'a> {
 }
 
 impl<'a> Remarks<'a> {
-    /// Comments that begin with `mark` and list these omissions and all error terms.
+    /// Comments that begin with `mark` and list the given omissions and all error terms.
     pub fn new(values: &'a Values<'a>, mark: &'static str, omissions: &[&str]) -> Self {
         Self {
             values,
@@ -56,13 +56,14 @@ impl<'a> Remarks<'a> {
         remarks
     }
 
-    /// A copy that does not mention these error terms.
+    /// Returns a copy that does not mention these error terms.
     pub fn including(mut self, is_included: fn(Term) -> bool) -> Self {
         self.is_included = is_included;
         self
     }
 
-    /// Adds the axes of the values, their direction or reader, and the divisor of raw output.
+    /// Adds the axes of the values, the direction of these axes or the program that reads them, and the divisor of the
+    /// raw output.
     pub fn reads(self, what: &str) -> Self {
         let axes = match self.values.order {
             AxisOrder::IDENTITY => "right, front, up",
@@ -97,12 +98,14 @@ impl<'a> Remarks<'a> {
         let terms: Vec<&str> = terms.into_iter().map(Term::name).collect();
         let note = (!terms.is_empty()).then(|| {
             let terms = terms.join(", ");
-            format!("this format does not correct error terms ({terms}); `turncal apply` does")
+            format!(
+                "this format does not contain error terms ({terms}); `turncal apply` corrects them"
+            )
         });
         self.omissions.iter().cloned().chain(note).collect()
     }
 
-    /// All lines as comments.
+    /// Returns all lines of the comments.
     pub fn text(&self) -> String {
         let omitted = self.omitted().join("; ");
         let omitted = (!omitted.is_empty()).then(|| format!("not included: {omitted}"));
@@ -116,7 +119,7 @@ impl<'a> Remarks<'a> {
         self.of_file((self.text() + text).into_bytes())
     }
 
-    /// A file that contains these comments in its own form, or not at all.
+    /// A file whose own form contains these comments, or which has none.
     pub fn of_file(&self, bytes: Vec<u8>) -> Exported {
         Exported {
             bytes,
@@ -130,7 +133,7 @@ pub fn title(record: &Calibration) -> String {
     let method = match (record.method, record.aiding) {
         (Some(Method::Ekf), Some(Aiding::Table)) => "Kalman filter, standstill and table attitude",
         (Some(Method::Ekf), _) => "Kalman filter, standstill only",
-        (Some(Method::SixPosition), _) => "closed form from static positions",
+        (Some(Method::SixPosition), _) => "closed form with static positions",
         (None, _) => "not stated",
     };
     let mut parts = vec![
@@ -149,7 +152,7 @@ pub fn title(record: &Calibration) -> String {
     parts.join("; ")
 }
 
-/// Definitions of `N` and `u`, for formats whose values are those of the record.
+/// Definitions of `N` and `u`, for formats that contain the values of the calibration file unchanged.
 pub fn equation(values: &Values) -> [String; 2] {
     let record = values.record;
     let axes = match &record.columns {
@@ -158,8 +161,8 @@ pub fn equation(values: &Values) -> [String; 2] {
             gyro.join(", "),
             accel.join(", ")
         ),
-        None => "axes of N and u: right, front, up; (y, x, -z) converts a log along front, right, down and (y, -x, z) \
-                 one along front, left, up"
+        None => "axes of N and u: right, front, up; (y, x, -z) converts values along front, right, down, and (y, -x, \
+        z) converts values along front, left, up"
             .to_owned(),
     };
     [

@@ -9,11 +9,11 @@ use super::remarks::{Exported, Remarks};
 use super::values::Values;
 use turncal::imu::{PerSensor, Sensor};
 
-/// Row-major about x, y, z: variance per sample, density² × rate.
+/// Covariance matrices about x, y, z in row-major order, with the variance per sample, density² × rate.
 pub fn covariance(values: &Values) -> Exported {
     let notes = [
-        "scale, misalignment and bias; publish the output of `turncal apply`, which has these errors removed",
-        "bias drift, which is not white; measure it with `turncal allan`",
+        "scale, misalignment and bias; publish the output of `turncal apply`, from which these errors are removed",
+        "bias drift, because it is not white; measure it with `turncal allan`",
     ];
     let line = |(key, sensor)| match values.triads.get(sensor).density().zip(values.rate) {
         Some((density, rate)) => {
@@ -34,14 +34,15 @@ pub fn covariance(values: &Values) -> Exported {
         .above(&lines.map(line).concat())
 }
 
-/// `SM n − bias` for the accelerometers, so the bias is in corrected units.
+/// The program computes `SM n − bias` for the accelerometers, so the bias is in corrected units.
 pub fn imu_calib(values: &Values) -> Exported {
     let program = PerSensor {
         gyro: Affine::offset(values.triads.gyro.bias),
         accel: Affine::complete(&values.triads.accel),
     };
     let notes = [
-        "gyro biases: imu_calib averages the gyros at its start, which includes Earth rate of up to 15.041 deg/h",
+        "gyro biases: imu_calib averages the gyros at its start, and the average includes Earth rate of up to 15.041 \
+         deg/h",
     ];
     let reads = ("#", "imu_calib reads rad/s and m/s^2");
     let matrix = list(&program.accel.matrix.transpose());

@@ -12,7 +12,7 @@ use turncal::recording::nanoseconds;
 use turncal::run::Run;
 use turncal_input::FileError;
 
-/// Start and end of a sample, angular rate and specific force along right, front and up.
+/// Start and end of a sample, and angular rate and specific force along the right, front and up axes.
 pub const HEADER: &str = "start_s,end_s,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s,accel_x_m_s2,\
                           accel_y_m_s2,accel_z_m_s2";
 
@@ -23,24 +23,24 @@ const ROWS: usize = 4096;
 /// Number of tasks whose text is written at once.
 const TASKS: usize = 64;
 
-/// The samples of a run to write.
+/// The samples of a run that are to be written.
 #[derive(Debug, Clone, Copy)]
 pub struct Samples<'a> {
     /// The run that contains the samples.
     pub run: &'a Run,
     /// Correction.
     pub correction: &'a Correction,
-    /// Whether missing samples are also written, interpolated, with 1 in a column `filled`.
+    /// Whether missing samples are interpolated and also written, with 1 in a column `filled`.
     pub fill: bool,
-    /// Verdict of the calibration, used as the name of a last column.
+    /// Verdict of the calibration, used as the name of the last column.
     pub verdict: Option<Word>,
 }
 
 impl Samples<'_> {
     /// Writes one row per log row, with [`HEADER`] first; for a temperature-dependent calibration, `in_range` states
-    /// whether it is valid at the temperature of the row. A row contains means over its sample, so the output is a log
-    /// with `output = "rate"` in `rad/s` and `m/s^2`. Numbers have the fewest digits that are read back as the same
-    /// value.
+    /// whether the calibration is valid at the temperature of the row. Each row contains the means over its sample, so
+    /// the output can itself be read as a log with `output = "rate"` in `rad/s` and `m/s^2`. Numbers are written with
+    /// the fewest digits that reproduce the same value when read.
     pub fn rows(&self, file: &mut dyn Write) -> io::Result<()> {
         let optional = |is_there: bool, column| if is_there { column } else { "" };
         let in_range = optional(self.correction.changes(), ",in_range");

@@ -9,7 +9,7 @@ use turncal::imu::{AXES, Sensor, Term};
 use turncal::units::{DEG_PER_H, MICRO_G};
 
 pub fn write(values: &Values) -> Exported {
-    let covariance = "covariance of the parameters; it is in calibration.json";
+    let covariance = "covariance of the parameters, which is in calibration.json";
     let mut lines = vec![format!(
         "\n{:<26}{:>25}{:>12}  unit",
         "name", "value", "1 sigma"

@@ -9,53 +9,53 @@ use turncal::calibration::{Correction, CorrectionError, Source};
 use turncal::imu::{AXES, AxisOrder, GaussMarkov, Noise, PerSensor, Sensor, Term};
 use turncal::run::Run;
 
-/// Polynomial orders in temperature supported by autopilots.
+/// Orders of the temperature polynomials that autopilots support.
 pub const ORDERS: usize = 3;
 
-/// Axes of the values of a format.
+/// Axes along which the values of a format are given.
 #[derive(Debug, Clone, Copy)]
 pub enum Axes {
     RightFrontUp,
     FrontRightDown,
-    /// Axes of the log of the run; without a run right, front, up.
+    /// Axes of the log of the run or, without a run, right, front and up.
     Log,
 }
 
-/// Every value of a calibration and, perhaps, a run of its instrument.
+/// All values of a calibration and, optionally, of a run of its instrument.
 pub struct Values<'a> {
     pub record: &'a Calibration,
-    /// Correction in the unit of the record, along right, front, up.
+    /// Correction matrix in the unit of the calibration file, along the right, front and up axes.
     pub correction: Correction,
     /// Axis order from the axes of the format to right, front, up.
     pub order: AxisOrder,
     /// Triads along the axes of the format.
     pub triads: PerSensor<Normalised>,
-    /// Gyro output per specific force, along the axes of the format.
+    /// Gyro output per unit of specific force, along the axes of the format.
     pub g_sensitivity: Matrix3<f64>,
-    /// Samples per second of the run, or of the calibration's own recording.
+    /// Sample rate of the run or, without a run, of the calibration's own recording, in Hz.
     pub rate: Option<f64>,
 }
 
 /// A triad in rad/s or m/s²: `n = sensitivity u + bias`, `u = inverse (n − bias)`, with `n = N / nominal`.
 pub struct Normalised {
-    /// Divisor of the quantity of the file per second, axis by axis.
+    /// Divisor of the file's quantity per second, axis by axis.
     pub nominal: Vector3<f64>,
     pub sensitivity: Matrix3<f64>,
     pub inverse: Matrix3<f64>,
     pub bias: Vector3<f64>,
-    /// 1σ of the scale factors of n; `None` if the record has none.
+    /// 1σ of the scale factors of n; `None` if the calibration file states none.
     pub scale_sigma: Option<Vector3<f64>>,
     /// 1σ of the bias in n.
     pub bias_sigma: Option<Vector3<f64>>,
     /// Coefficients of powers 1 to 3 of the bias about the reference temperature, axis by axis, in n per °C, °C², °C³.
     pub bias_powers: [[f64; ORDERS]; 3],
-    /// Noise with white noise above zero, if it is known.
+    /// Noise of the instrument, if it is known and its white noise is greater than zero.
     pub noise: Option<Noise>,
 }
 
 impl<'a> Values<'a> {
-    /// The values for a format. Without a run, the unit gives the nominal scale; for counts, the calibrated scale
-    /// factors, rounded to three digits.
+    /// The values for a format. Without a run, the unit gives the nominal scale; for counts, the nominal scale is the
+    /// calibrated scale factors rounded to three digits.
     pub fn new(
         record: &'a Calibration,
         run: Option<&Run>,
@@ -90,8 +90,8 @@ impl<'a> Values<'a> {
         })
     }
 
-    /// The unit of `N`. A count may be one of a rate or, per second, one of an increment; the record does not
-    /// distinguish the two.
+    /// The unit of `N`. A count may be a unit of rate or, per second, a unit of increment; the calibration file does
+    /// not distinguish the two cases.
     pub fn unit(&self, sensor: Sensor) -> String {
         let unit = self.record.unit.as_ref();
         match unit.map(|unit| unit.get(sensor).as_str()) {
@@ -106,17 +106,17 @@ impl<'a> Values<'a> {
         sensor.pick("rad/s", "m/s^2")
     }
 
-    /// 1σ of the parameters of a triad, in the unit of the record.
+    /// 1σ of the parameters of a triad, in the unit of the calibration file.
     pub fn sigma(&self, sensor: Sensor) -> Option<&TriadRecord> {
         Some(self.record.sigma.as_ref()?.get(sensor))
     }
 
-    /// Omission of these keys; `None` if there are none.
+    /// Remark on the omission of these keys; `None` if no key is omitted.
     pub fn missing(keys: &[String], program: &str) -> Option<String> {
         let keys = (!keys.is_empty()).then(|| keys.join(", "))?;
         Some(format!(
-            "{keys}: {program} does not start without them; export with --run RUN.toml, or measure them with \
-             `turncal allan`"
+            "{keys}: {program} does not start without these keys; export with --run RUN.toml, or measure the noise \
+             with `turncal allan`"
         ))
     }
 }
@@ -172,7 +172,7 @@ impl Normalised {
         Some(self.noise?.random_walk)
     }
 
-    /// Bias variation, and whether it is only the usual variation for this white noise.
+    /// Bias variation, and whether it is only the value that is usual for this white noise.
     pub fn varying(&self) -> Option<(GaussMarkov, bool)> {
         let noise = self.noise?;
         let usual = || (usual_variation(&noise), true);

@@ -2,12 +2,12 @@
 
 use turncal_logs::clock::REACH;
 
-/// Limits for the number of rows in memory.
+/// Limits for the number of rows kept in memory.
 #[derive(Debug, Clone, Copy)]
 pub struct Sizes {
-    /// Longer logs are packed; up to this length they take at most 50 MB.
+    /// Longer logs are packed; a log of up to this length takes at most 50 MB.
     pub long: usize,
-    /// Number of rows searched for faults at once.
+    /// Number of rows that are searched for faults at once.
     pub part: usize,
 }
 
@@ -20,11 +20,11 @@ impl Default for Sizes {
     }
 }
 
-/// Rows in memory, without duplicates.
+/// The rows in memory, without duplicates.
 #[derive(Default)]
 pub struct Held {
     pub columns: [Vec<f64>; 6],
-    /// Number of rows before each duplicate, and its line.
+    /// For each duplicate row, the number of rows before it and its line in the file.
     pub duplicates: Vec<(usize, u64)>,
 }
 

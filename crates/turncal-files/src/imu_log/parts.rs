@@ -1,4 +1,4 @@
-//! Samples of rows, in parts: a short log at once, a long one packed part by part.
+//! Conversion of rows to samples: a short log at once, a long log packed part by part.
 
 use std::ops::Range;
 
@@ -19,7 +19,7 @@ use turncal_logs::clock::{Line, REACH, Stamps, Uniform, Wander};
 /// Additional rows searched on either side of a part; more than the reach of a bridge and its evidence.
 const BESIDE: usize = 1 << 13;
 
-/// Samples of a log so far.
+/// The samples of a log that have been read so far.
 pub struct Parts<'a> {
     log: &'a ImuLog<'a>,
     layout: Layout,
@@ -42,7 +42,8 @@ pub struct Parts<'a> {
 }
 
 impl<'a> Parts<'a> {
-    /// Starts with the first rows of a log, or all of them. For a log in parts, the drift of the samples may be known.
+    /// Starts with the first rows of a log, or with all its rows. For a log that is read in parts, the drift of the
+    /// samples may already be known.
     pub fn new(
         log: &'a ImuLog<'a>,
         layout: Layout,
@@ -91,12 +92,12 @@ impl<'a> Parts<'a> {
         self.size.map(|size| self.taken + size + 2 * BESIDE)
     }
 
-    /// Whether enough rows are in memory to process some.
+    /// Whether enough rows are in memory to process some of them.
     pub fn is_full(&self, held: &Held) -> bool {
         self.end().is_some_and(|end| held.len() >= end + REACH)
     }
 
-    /// Processes rows in memory (all at the end of the file) and releases those no longer needed.
+    /// Processes rows in memory (at the end of the file, all rows), and releases the rows that are no longer needed.
     pub fn take(
         &mut self,
         held: &mut Held,
@@ -258,7 +259,7 @@ impl<'a> Parts<'a> {
         self.taken -= rows;
     }
 
-    /// Whether rows were packed while reading.
+    /// Whether rows were packed while the log was read.
     pub fn are_packed(&self) -> bool {
         self.size.is_some()
     }
@@ -273,7 +274,8 @@ impl<'a> Parts<'a> {
         self.next - self.rows
     }
 
-    /// The samples of the complete log; `integral_error` is that of its accelerometers, in their quantity times s.
+    /// The samples of the complete log; `integral_error` is the error of the integrals of the accelerometers, in their
+    /// quantity times s.
     pub fn finish(
         mut self,
         clock: Uniform,

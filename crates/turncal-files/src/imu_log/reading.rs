@@ -1,4 +1,4 @@
-//! The sample rows of a file in order of time, all in memory or packed while reading.
+//! The sample rows of a file in order of time, either all in memory or packed while they are read.
 
 use super::held::{Held, Sizes};
 use super::parts::Parts;
@@ -15,7 +15,7 @@ pub struct Reading<'a> {
     log: &'a ImuLog<'a>,
     /// Column indices of a sample in a row.
     places: [Option<usize>; 6],
-    /// The column that distinguishes instruments, and its value for the selected one.
+    /// The column that distinguishes the instruments, and its value for the selected instrument.
     instance: Option<(usize, f64)>,
     pub stamps: Stamps,
     pub temperature: Option<Temperatures>,
@@ -108,7 +108,7 @@ impl<'a> Reading<'a> {
         let lacking = (self.lacking > 0).then(|| {
             let rows = counted(self.lacking, "row");
             format!(
-                "turncal counts {rows} of {file} without a gyro or accelerometer value as missing."
+                "turncal counts {rows} of {file} with a missing gyro or accelerometer value as missing."
             )
         });
         [blank, lacking].into_iter().flatten()
@@ -125,7 +125,7 @@ impl<'a> Reading<'a> {
             0 => (String::new(), "Record a run with dwells and turns."),
             lacking => (
                 format!(
-                    " and {} without a gyro or accelerometer value",
+                    " and {} with a missing gyro or accelerometer value",
                     counted(lacking, "row")
                 ),
                 "If gyros and accelerometers are in separate rows, `turncal init` drafts a run.toml for that layout.",
@@ -141,7 +141,7 @@ impl<'a> Reading<'a> {
 }
 
 impl<'a> Reading<'a> {
-    /// Reads all rows; the drift of the samples of a long log may be known.
+    /// Reads all rows; for a long log, the drift of the samples may already be known.
     pub fn all(
         &mut self,
         csv: &mut LogRows,
@@ -178,7 +178,7 @@ impl<'a> Reading<'a> {
 }
 
 impl ImuLog<'_> {
-    /// Reads the samples, finds and bridges faults; `notes` receives remarks about the file.
+    /// Reads the samples, then finds and bridges faults; `notes` receives remarks about the file.
     pub fn read(&self, notes: &mut Vec<String>) -> Result<ImuSamples, FileError> {
         self.read_by(Sizes::default(), notes)
     }

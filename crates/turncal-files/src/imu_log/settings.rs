@@ -1,4 +1,4 @@
-//! Settings of the instrument's log in `run.toml`, and its columns.
+//! Settings for the instrument's log in `run.toml`, and the columns of this log.
 
 use nalgebra::Vector3;
 
@@ -17,18 +17,18 @@ use turncal_logs::rows::LogRows;
 pub struct ImuLog<'a> {
     pub source: Source<'a>,
     pub clock: Clock<'a>,
-    /// Source of the accelerometers, if not in the gyro rows.
+    /// Source of the accelerometers, if they are not in the gyro rows.
     pub accel_from: Option<(Source<'a>, Clock<'a>)>,
-    /// Column and number of the selected instrument, if the log has several.
+    /// Column that identifies the instrument, and its number, if the log contains several instruments.
     pub instance: Option<(&'a str, f64)>,
-    /// Empty names for a missing triad.
+    /// The names are empty for a missing triad.
     pub triads: PerSensor<[&'a str; 3]>,
     pub temperature: Option<TemperatureColumns<'a>>,
     pub output: Output,
     pub axes: AxisOrder,
     pub stamp: TimeStamp,
     pub continuous: bool,
-    /// Scale factors along right-front-up.
+    /// Scale factors along the right, front and up axes.
     pub nominal: PerSensor<Nominal>,
     /// Largest magnitude of a row value.
     pub full_scale: PerSensor<Option<f64>>,
@@ -41,7 +41,7 @@ pub struct Layout {
     pub names: [FileColumn; 6],
     /// `None` for a missing triad.
     pub places: [Option<usize>; 6],
-    /// Body axis of each (right, front or up).
+    /// Body axis of each column (right, front or up).
     pub body_axes: [usize; 6],
 }
 
@@ -51,7 +51,7 @@ pub fn sensor(column: usize) -> Sensor {
 }
 
 impl Layout {
-    /// Rad and m/s per unit of each column in a row, from nominal scales.
+    /// The angle in rad or velocity in m/s that one unit of each column in a row represents, from nominal scales.
     pub fn units(&self, log: &ImuLog, period: f64) -> [f64; 6] {
         let unit = |k: usize| log.seconds(period) / log.nominal.get(sensor(k)).0[self.body_axes[k]];
         std::array::from_fn(unit)
@@ -61,14 +61,14 @@ impl Layout {
         std::array::from_fn(|k| *log.full_scale.get(sensor(k)))
     }
 
-    /// The columns of a triad along right, front and up.
+    /// The columns of a triad along the right, front and up axes.
     pub fn columns(&self, sensor: Sensor) -> [usize; 3] {
         let first = 3 * sensor as usize;
         let along = |axis: usize| (first..first + 3).find(|&k| self.body_axes[k] == axis);
         [0, 1, 2].map(|axis| along(axis).unwrap_or(first + axis))
     }
 
-    /// One rad and m/s along right, front and up, in the unit of the corresponding column.
+    /// The unit of the corresponding column that equals one rad or one m/s, along the right, front and up axes.
     pub fn body_nominal(&self, log: &ImuLog, sensor: Sensor) -> Vector3<f64> {
         let columns = self.columns(sensor);
         Vector3::from_fn(|axis, _| {

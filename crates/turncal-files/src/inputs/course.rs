@@ -1,5 +1,5 @@
-//! Samples of a stream integrated over other intervals: between any times, or over the samples of a uniform clock if
-//! the clock of the stream drifts.
+//! Samples of a stream, integrated over other intervals: between any times or, if the clock of the stream drifts, over
+//! the samples of a uniform clock.
 
 use std::ops::Range;
 
@@ -15,7 +15,7 @@ const SAME: f64 = 1e-6;
 /// Samples without a gap, with integrals in values times samples.
 #[derive(Default)]
 pub struct Course {
-    /// Start of the samples, in samples.
+    /// Start of these samples, as a number of samples.
     pub begin: f64,
     pub sums: [Vec<f64>; 3],
 }
@@ -65,10 +65,11 @@ impl Course {
 
     /// Mean square error of the integral midway between two edges.
     ///
-    /// Every second edge is omitted and interpolated from its neighbours, and every fourth edge from those two edges
-    /// away. The squared error due to white noise (modelled by the filter) grows linearly with the edge distance; that
-    /// of a signal not followed by the cubic grows with its eighth power. The two parts can therefore be separated; the
-    /// signal part at the actual distance is 2⁻⁸ of that at twice the distance.
+    /// For this estimate, every second edge is omitted and interpolated from its neighbours, and every fourth edge from
+    /// those two edges away. The squared error due to white noise (modelled by the filter) grows linearly with the edge
+    /// distance; the squared error of a signal that the cubic does not follow grows with the eighth power of the
+    /// distance. The two parts can therefore be separated; the signal part at the actual distance is 2⁻⁸ of the signal
+    /// part at twice the distance.
     pub fn edge_error(&self) -> [f64; 3] {
         self.sums.each_ref().map(|sums| {
             let missed = |apart: usize| {
@@ -114,7 +115,7 @@ fn beyond(sums: &[f64], edge: usize, part: f64) -> f64 {
     cubic(from + part) - cubic(from)
 }
 
-/// Samples over intervals other than those of their stream, with the resulting error.
+/// Samples integrated over intervals other than those of their stream, with the resulting error.
 pub struct Resampled {
     output: Output,
     /// Sum of squared errors at the edges of all samples.
@@ -136,7 +137,7 @@ impl Resampled {
         }
     }
 
-    /// Row value for the interval between two positions; `None` if outside the data.
+    /// Row value for the interval between two positions; `None` if the interval is outside the data.
     pub fn sample(&mut self, course: &Course, begin: f64, end: f64) -> Option<[f64; 3]> {
         let (sums, weight) = course.between(begin, end)?;
         self.weights += weight;
@@ -170,7 +171,7 @@ const AHEAD: f64 = 2.0;
 /// Number of samples that the cubic extends before the first one.
 const BACK: usize = 2;
 
-/// Uniform samples of a triad, produced as drifting samples arrive.
+/// Uniform samples of a triad, which are computed as drifting samples arrive.
 pub struct Even {
     wander: Wander,
     lag: f64,
@@ -180,13 +181,13 @@ pub struct Even {
     resampled: Resampled,
 }
 
-/// Edges of drifting samples relative to uniform samples; the uniform samples start with the first whole one. Stamps
-/// are `lag` samples after the start of a sample.
+/// Edges of drifting samples relative to uniform samples; the uniform samples start with the first whole one. Each time
+/// stamp is `lag` samples after the start of its sample.
 pub fn place(wander: &Wander, lag: f64, edge: usize) -> f64 {
     wander.time(edge as f64 - lag) + lag
 }
 
-/// Number of uniform samples that these cover, from the first.
+/// Number of uniform samples that these drifting samples cover, from the first.
 pub fn reached(wander: &Wander, lag: f64, samples: &Range<usize>) -> Range<usize> {
     let first = place(wander, lag, 0).ceil();
     let of = |edge| place(wander, lag, edge) - first;
@@ -210,7 +211,8 @@ impl Even {
         }
     }
 
-    /// Returns the samples covered by the input (all at the end) and releases data no longer needed.
+    /// Returns the samples that the input covers (at the end, all samples), and releases data that are no longer
+    /// needed.
     pub fn give(&mut self, at_end: bool, mut take: impl FnMut([f64; 3])) {
         let until = self.held.end() - if at_end { 0.0 } else { AHEAD };
         let edge = |time: f64| self.wander.number(time - self.lag) + self.lag;

@@ -1,4 +1,4 @@
-//! Two streams with separate clocks, combined into rows with one clock.
+//! Two streams with separate clocks, which are combined into rows with one clock.
 //!
 //! Gyros are unchanged. Accelerometers are integrated over each gyro sample: their integral is known at the edges of
 //! their samples and interpolated by a cubic through four of them. The sum over samples is exact, so errors do not
@@ -21,11 +21,11 @@ pub struct Part<'a> {
     pub source: &'a Source<'a>,
     pub clock: Clock<'a>,
     pub columns: [&'a str; 3],
-    /// Columns passed on unchanged.
+    /// Columns that are passed on unchanged.
     pub further: &'a [&'a str],
 }
 
-/// Column names of both triads, made unique.
+/// Column names of both triads, modified so that each is unique.
 pub fn distinct(triads: &PerSensor<[&str; 3]>) -> PerSensor<[String; 3]> {
     let bare = |name: &str| name.strip_prefix('-').unwrap_or(name).to_owned();
     let clash = |name: &str| triads.gyro.iter().any(|other| bare(other) == bare(name));
@@ -116,7 +116,7 @@ fn apart(file: &Path, gyro: &Track, accel: &Track) -> FileError {
         format!("{first} s to {} s", first + last * period)
     };
     let found = format!("an accelerometer stream from {}", of(accel));
-    let expected = format!("times that overlap the gyro stream ({})", of(gyro));
+    let expected = format!("times that overlap those of the gyro stream ({})", of(gyro));
     let advice = "Convert both streams to the same clock, or correct time_unit.";
     FileError::of(file, found, expected, advice)
 }
@@ -130,7 +130,7 @@ fn remarks_of_both(gyro: Track, accel: Track) -> Vec<String> {
     remarks.extend(uneven.map(|said| format!("Accelerometers: {said}")));
     remarks.push(format!(
         "Gyros (every {} s) and accelerometers (every {} s) are separate streams, so turncal integrated the \
-         accelerometers over the gyro samples. If their clocks may differ, estimate the offset with --with \
+         accelerometers over the gyro samples. If the two clocks may differ, estimate the offset with --with \
          time-offset.",
         rounded(gyro.clock.period, 7),
         rounded(accel.clock.period, 7)

@@ -44,7 +44,7 @@ pub fn read(
         }
         if row(start) == row(end) {
             let period = imu.period;
-            let expected = format!("a segment of several samples (sample period {period} s)");
+            let expected = format!("a segment with several samples (sample period {period} s)");
             return wrong("no sample", expected);
         }
         let label = csv.text(label_column)?.into_owned();

@@ -1,4 +1,4 @@
-//! Sources of rows and their clocks, as described in `run.toml`.
+//! Sources of rows and their clocks, described in `run.toml`.
 
 use crate::schema::instrument::Fields;
 use crate::schema::{AccelFromFile, TimeColumn, TimeUnitField};
@@ -55,7 +55,7 @@ impl<'a> Fields<'a> {
         };
         if nanoseconds.is_some() && unit.is_some_and(|unit| unit != seconds) {
             let path = format!("{table}.time_unit");
-            let advice = "Set it to `s`, or remove it.";
+            let advice = "Set time_unit to `s`, or remove it.";
             return Err(self.document.wrong(&path, "`s`", advice));
         }
         Ok(Clock {
@@ -67,7 +67,7 @@ impl<'a> Fields<'a> {
         })
     }
 
-    /// Source of the accelerometers, if not in the gyro rows, and their clock.
+    /// Source of the accelerometers and their clock, if they are not in the gyro rows.
     pub fn accel_from(
         &self,
         gyro: &Source<'a>,
@@ -102,7 +102,7 @@ impl<'a> Fields<'a> {
             clock.unit = of_gyro.unit;
         }
         if clock.column.is_none() {
-            let meaning = "the time column of the sensor, because separate streams both need one";
+            let meaning = "the time column of the sensor, because two separate streams both need a time column";
             return Err(self.document.missing(&format!("{path}.time"), meaning));
         }
         Ok(Some((source, clock)))

@@ -103,7 +103,7 @@ impl<'a> Fields<'a> {
         if names.len() != letters.len() {
             let of_angles = "turntable.columns.angles";
             let path = if names.is_empty() { path } else { of_angles };
-            let expected = "one angle column for each axis, outermost first";
+            let expected = "one angle column per axis, outermost axis first";
             let advice = "Complete `angles` or `axes`.";
             return Err(self.document.wrong(path, expected, advice));
         }
@@ -116,7 +116,7 @@ impl<'a> Fields<'a> {
         let axes = letters.iter().map(|letter| Some(axis(letter)?.1));
         let Some(axes) = axes.collect() else {
             let expected = "`x`, `y` or `z` for each axis";
-            let advice = "Name the axis about which the table turns when all angles are zero.";
+            let advice = "For each angle, name the axis about which it turns the table when all angles are zero.";
             return Err(self.document.wrong(path, expected, advice));
         };
         let quaternion = columns.quaternion.iter().flat_map(|names| &names.0);
@@ -133,7 +133,8 @@ impl<'a> Fields<'a> {
                 let path = format!("turntable.{key}");
                 let expected =
                     "`angles` in the table log, because a quaternion does not separate the axes";
-                let advice = "Remove it, or add the angles of the table axes, with or without the quaternion.";
+                let advice =
+                    "Remove it, or add the angles of the table axes; the quaternion may stay.";
                 return Err(self.document.wrong(&path, expected, advice));
             }
             axes += kind.of_table(angles, sigma(stated));
@@ -155,7 +156,7 @@ pub struct TableLogFile<'a> {
 }
 
 impl TableLogFile<'_> {
-    /// Reads the log of a run with these samples; `notes` receives remarks about the file.
+    /// Reads the table log of a run with these samples; `notes` receives remarks about the file.
     pub fn read(&self, imu: &ImuSamples, notes: &mut Vec<String>) -> Result<TableLog, FileError> {
         let mut csv = self.source.open()?;
         let mut stamps = self.clock.start(&mut csv)?.without_bursts();
@@ -186,7 +187,8 @@ impl TableLogFile<'_> {
         let (start, end) = (imu.start(), imu.end());
         if *last < start || *first > end {
             let found = format_args!("readings from {first} s to {last} s");
-            let expected = format_args!("times that overlap the IMU log ({start} s to {end} s)");
+            let expected =
+                format_args!("times that overlap those of the IMU log ({start} s to {end} s)");
             return Err(csv.error(found, expected, "Convert both files to the same clock."));
         }
         Ok(TableLog {

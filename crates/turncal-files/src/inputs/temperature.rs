@@ -19,7 +19,7 @@ pub struct TemperatureColumns<'a> {
 }
 
 impl<'a> TemperatureColumns<'a> {
-    /// One column for both triads, or one or three for each.
+    /// One column for both triads, or one column or three columns for each triad.
     pub fn of_fields(column: &'a TemperatureColumn, unit: TemperatureUnit) -> Self {
         let mut all = Self {
             names: Vec::new(),
@@ -50,7 +50,7 @@ impl<'a> TemperatureColumns<'a> {
         })
     }
 
-    /// The columns, each once.
+    /// The columns, each listed only once.
     pub fn names(&self) -> &[&'a str] {
         &self.names
     }
@@ -110,7 +110,7 @@ pub struct Read {
 }
 
 impl Temperatures {
-    /// Processes a row with this stamp, s.
+    /// Processes a row with this time stamp, s.
     pub fn take(&mut self, csv: &LogRows, time: f64) {
         let first = *self.first.get_or_insert(time);
         let span = (time - first) / TEMPERATURE_SPACING;
@@ -122,7 +122,7 @@ impl Temperatures {
         }
     }
 
-    /// The result, for stamps delayed by this time relative to the start of the first sample, s.
+    /// Returns the temperatures, for stamps that are delayed by this time relative to the start of the first sample, s.
     pub fn read(self, file: &str) -> Read {
         let facts = self.channels.first().and_then(|channel| {
             let count: f64 = channel.spans.iter().map(|of| f64::from(of.1)).sum();
@@ -185,7 +185,7 @@ impl Channel {
             let (name, largest) = (&self.name, LARGEST);
             notes.push(format!(
                 "{file}, line {line}, column {name}: found {value}, expected a temperature within ±{largest} °C. \
-                 turncal ignored the column. If it is in kelvin or fahrenheit, set temperature_unit = \"K\" or \
+                 turncal ignored the column. If the unit is kelvin or fahrenheit, set temperature_unit = \"K\" or \
                  \"degF\" in [imu]."
             ));
         }
@@ -193,8 +193,8 @@ impl Channel {
         if missing > 0 {
             let name = &self.name;
             notes.push(format!(
-                "{file}, column {name}: no temperature in {}, the first in line {line}. turncal interpolated the \
-                 temperature there.",
+                "{file}, column {name}: the temperature is missing in {}, first in line {line}. turncal interpolated \
+                 the missing temperatures.",
                 counted(missing, "row")
             ));
         }

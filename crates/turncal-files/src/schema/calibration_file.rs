@@ -1,4 +1,4 @@
-//! `calibration.json` and `truth.json`: validated on reading, and on writing by the same checks.
+//! `calibration.json` and `truth.json`; the same checks validate them on reading and on writing.
 //!
 //! A failed calibration is written with values of any size, because its findings state that they must not be used.
 
@@ -57,7 +57,7 @@ fn record_of(bytes: &[u8], path: &Path) -> Result<Calibration, FileError> {
             file: path.to_owned(),
             place: Place::Character { line, column },
             message: format!(
-                "not a calibration in the format {FORMAT}: {what}. Correct the file or write it again with turncal."
+                "this is not a calibration in the format {FORMAT}: {what}. Correct the file or write it again with turncal."
             ),
         }
     })?;
@@ -65,7 +65,7 @@ fn record_of(bytes: &[u8], path: &Path) -> Result<Calibration, FileError> {
     Ok(record)
 }
 
-/// The record as file bytes that [`read_calibration`] accepts; `path` is used in error messages.
+/// The record as the bytes of a file that [`read_calibration`] accepts; `path` is used in error messages.
 pub fn calibration_json(record: &Calibration, path: &Path) -> Result<Vec<u8>, FileError> {
     let expected = "values that JSON can represent".to_owned();
     let written = || small_file::pretty(record).map_err(|error| (error.to_string(), expected));
@@ -75,7 +75,7 @@ pub fn calibration_json(record: &Calibration, path: &Path) -> Result<Vec<u8>, Fi
     Ok(bytes)
 }
 
-/// Writes the complete record or nothing; an existing file is replaced only with `force`.
+/// Writes the complete record or nothing at all; an existing file is replaced only with `force`.
 pub fn write_calibration(record: &Calibration, path: &Path, force: bool) -> Result<(), FileError> {
     write_whole(path, &calibration_json(record, path)?, force)
 }
@@ -135,7 +135,7 @@ fn check_parameters(record: &Calibration) -> Checked {
         for name in names {
             let expected = || {
                 let known = known.iter().map(String::as_str);
-                let advice = suggestion(name, known, "not a parameter of this form");
+                let advice = suggestion(name, known, "a name that is not a parameter of this form");
                 format!("names of parameters of the {} form ({advice})", form.name())
             };
             expect!(known.contains(name), expected(), "`{name}` in {field}");
@@ -156,7 +156,7 @@ fn check_covariance(record: &Calibration) -> Checked {
     for (i, row) in record.covariance.iter().enumerate() {
         expect!(
             row.len() == size,
-            format!("{size} values, because the covariance is square"),
+            format!("{size} values in each row, because the covariance is square"),
             "{} in row {} of covariance",
             counted(row.len(), "value"),
             i + 1
@@ -185,7 +185,7 @@ fn check_temperature(record: &Calibration) -> Checked {
         let all = [lowest, highest, reference, rate];
         expect!(
             all.iter().all(|v| v.is_finite()) && lowest <= highest && rate >= 0.0,
-            "a finite range with its lower end first and a rate of at least zero",
+            "a finite range with its lower end first, and a rate of at least zero",
             "temperature.range.{} from {lowest} to {highest} °C",
             sensor.name()
         );
@@ -203,7 +203,7 @@ fn check_temperature(record: &Calibration) -> Checked {
     expect!(
         covered && rows().all(|row| row.len() == n),
         "one row of covariance per coefficient and one row of cross per parameter",
-        "temperature.covariance or .cross of the wrong size"
+        "temperature.covariance or .cross with the wrong size"
     );
     let none = PerSensor::default();
     let anywhere = thermal_state(&thermal.range, &none, &none);

@@ -15,14 +15,14 @@ use turncal::recording::Temperature;
 use turncal::run::Run;
 use turncal_input::{Celsius, Document, FileError, NonNegative, small_file};
 
-/// The version of the format.
+/// The version of the file format.
 const FORMAT: &str = "turncal-campaign/1";
-/// Recordings of one instrument with their common settings.
+/// Recordings of one instrument with the settings common to them.
 #[derive(Debug, Clone)]
 pub struct Campaign {
-    /// Name of its directory or file.
+    /// Name of the campaign's directory or file.
     pub name: String,
-    /// Recordings in order of name, independent of the order in the file.
+    /// Recordings sorted by name, so that their order in the file does not matter.
     pub runs: Vec<Run>,
     /// Common settings.
     pub together: Together,
@@ -62,7 +62,7 @@ enum TemperatureFile {
 }
 
 impl Campaign {
-    /// Whether a file is a campaign.
+    /// Whether a file describes a campaign.
     pub fn is_at(path: &Path) -> bool {
         if !is_toml(path) {
             return false;
@@ -145,7 +145,10 @@ pub fn campaign_text(paths: &[String], day_to_day: &DayToDay) -> String {
         day_to_day: differing.map(rounded_sigma).collect(),
     };
     let mut remarks = Remarks::default();
-    remarks.before("day_to_day", "1σ from one recording to the next");
+    remarks.before(
+        "day_to_day",
+        "1σ of the difference from one recording to the next",
+    );
     page::text(FORMAT, &file, &remarks)
 }
 

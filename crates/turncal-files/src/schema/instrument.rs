@@ -19,7 +19,7 @@ use turncal_input::{Document, FileError, OneOrThree, list, suggestion};
 use turncal_logs::DataFile;
 use turncal_logs::clock::{Breaks, Clock};
 
-/// Default 1σ of scale factors, misalignments and biases, typical of consumer MEMS.
+/// Default 1σ of scale factors, misalignments and biases, typical of consumer MEMS sensors.
 pub const USUAL_SCALE: f64 = 50_000.0 * PPM;
 pub const USUAL_INSTALLATION: f64 = 2.0 * DEGREE;
 /// Default 1σ of biases, rad/s and m/s².
@@ -27,9 +27,9 @@ pub const USUAL_BIAS: PerSensor<f64> = PerSensor {
     gyro: 2.0 * DEGREE,
     accel: 1.0,
 };
-/// Assumed sample period until estimated from motion, s.
+/// Sample period that is assumed until it has been estimated from motion, s.
 pub const USUAL_PERIOD: f64 = 0.01;
-/// Relative 1σ of a rate that no time stamps confirm: the tolerance of the oscillators of MEMS.
+/// Relative 1σ of a rate that is not confirmed by time stamps: the tolerance of the oscillators in MEMS sensors.
 pub const RATE_SIGMA: f64 = 0.01;
 /// Maximum relative 1σ of a scale factor.
 const WIDEST_SCALE: f64 = 10.0;
@@ -38,7 +38,7 @@ const WIDEST_BIAS: f64 = 1e6;
 /// Maximum angle error, ″.
 const HALF_TURN: f64 = 648_000.0;
 
-/// Content of a `run.toml` while reading; `notes` receives remarks on assumptions and fields without effect.
+/// Content of a `run.toml` that is being read; `notes` receives remarks on assumptions and on fields without effect.
 pub struct Fields<'a> {
     pub document: Document<'a>,
     pub run: &'a RunFile,
@@ -52,14 +52,14 @@ pub struct Fields<'a> {
 pub struct InstrumentFields<'a> {
     pub log: ImuLog<'a>,
     pub known: Instrument,
-    /// Whether the sample period is stated neither in run.toml nor by a time column.
+    /// Whether neither run.toml nor a time column gives the sample period.
     pub without_period: bool,
     /// Relative 1σ of the sample period.
     pub period_sigma: f64,
 }
 
 impl<'a> Fields<'a> {
-    /// The fields of a document; the files given in it are in its directory.
+    /// The fields of a document; the files that it names are in its directory.
     pub fn new(document: Document<'a>, run: &'a RunFile, in_memory: &'a [DataFile]) -> Self {
         Self {
             document,
@@ -79,7 +79,7 @@ impl<'a> Fields<'a> {
         let accel_from = self.accel_from(&source, of_gyro)?;
         if let (Some(of), Some(_)) = (&imu.instance, &accel_from) {
             let meaning = format!(
-                "a stream of one instrument without `{}`, which accel_from requires",
+                "a stream that contains only one instrument, without `{}`, because accel_from is given",
                 of.column
             );
             return Err(self.document.missing("imu.stream", &meaning));
@@ -134,8 +134,8 @@ impl<'a> Fields<'a> {
             return Ok(false);
         }
         if self.run.imu.output != Output::Rate || self.run.turntable.is_some() {
-            let meaning = "a column name (pulses, increments and runs with a [turntable] need either this or \
-                sample_period_s)";
+            let meaning = "a column name (pulses, increments and runs with a [turntable] need either a time column or \
+            sample_period_s)";
             return Err(self.document.missing("imu.columns.time", meaning));
         }
         clock.period = Some(USUAL_PERIOD);
@@ -221,7 +221,8 @@ impl<'a> Fields<'a> {
             let path = format!("imu.columns.{name}");
             return Err(self.document.missing(&path, "the names of three columns"));
         }
-        let note = format!("The log has no {name} columns. turncal assumed zero output.");
+        let note =
+            format!("The log has no {name} columns. turncal assumed that their output is zero.");
         self.notes.push(note);
         Ok("count".to_owned())
     }
@@ -249,7 +250,8 @@ impl<'a> Fields<'a> {
         match (of.prior.scale.map(OneOrThree::vector), of_unit) {
             (None, Some(of_unit)) => Ok(Vector3::repeat(of_unit)),
             (None, None) => {
-                let meaning = "the counts per second for 1 rad/s or 1 m/s², because the size of a count varies by instrument";
+                let meaning = "the counts per second for 1 rad/s or 1 m/s², because the size of a count depends on the \
+                               instrument";
                 Err(document.missing(&path, meaning))
             }
             (Some(scale), _) if scale.iter().any(|&s| s == 0.0) => {
@@ -258,14 +260,15 @@ impl<'a> Fields<'a> {
             }
             (Some(scale), Some(of_unit)) if !is_near(&scale, of_unit) => {
                 let expected = format_args!("about {of_unit} (1 rad/s or 1 m/s² in this unit)");
-                let advice = "Correct the scale or the unit, or remove the scale.";
+                let advice = "Correct the scale or the unit, or omit the scale.";
                 Err(document.wrong(&path, expected, advice))
             }
             (Some(scale), _) => Ok(scale),
         }
     }
 
-    /// The prior of a triad with this nominal scale, along right-front-up; wide defaults if not stated.
+    /// The prior of a triad with this nominal scale, along the right, front and up axes; wide defaults if it is not
+    /// stated.
     fn prior(&mut self, sensor: Sensor, nominal: Vector3<f64>) -> Result<Prior, FileError> {
         let (of, axes) = (self.run.imu.of(sensor), self.run.imu.axes());
         let bias_words = sensor.pick("bias ± 2 °/s", "bias ± 1 m/s²");
@@ -301,7 +304,7 @@ impl<'a> Fields<'a> {
         let [scale_sigma, installation_sigma, bias_sigma] = sigma;
         if !assumed.is_empty() && of.columns.is_some() {
             self.notes.push(format!(
-                "[imu.prior.{}] in run.toml is incomplete. turncal assumed (1σ): {}.",
+                "The fields of [imu.prior.{}] in run.toml are incomplete. turncal assumed (1σ): {}.",
                 sensor.name(),
                 assumed.join(", ")
             ));

@@ -8,7 +8,7 @@ use toml::de::{DeTable, DeValue};
 use turncal::laboratory::{Condition, Laboratory};
 use turncal_input::{Document, FileError, small_file};
 
-/// The version of the format.
+/// The version of the file format.
 const FORMAT: &str = "turncal-laboratory/1";
 
 /// A lab.toml to be completed.
@@ -147,7 +147,7 @@ fn check_complete(document: Document, mut open: Vec<String>) -> Result<(), FileE
         count => format!("{count} open fields"),
     };
     let all = open.join(", ");
-    let expected = "text or a value in each (ISO/IEC 17025, 7.8.2 and 7.8.4)";
+    let expected = "a text or value in each field (ISO/IEC 17025, 7.8.2 and 7.8.4)";
     let advice = format_args!("Complete {all}.");
     Err(FileError::of(document.file, fields, expected, advice))
 }
@@ -170,7 +170,7 @@ fn check_values(document: Document, file: &Laboratory) -> Result<(), FileError> 
         };
         if !of.is_none_or(is_sound) {
             let expected =
-                format_args!("a value from {low} to {high} and an uncertainty of at least zero");
+                format_args!("a value from {low} to {high}, and an uncertainty of at least zero");
             let path = format!("conditions.{name}");
             return Err(document.wrong(&path, expected, "Correct this value."));
         }

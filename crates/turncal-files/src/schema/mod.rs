@@ -1,5 +1,5 @@
-//! Files written by users and for users: fields of TOML and JSON files as serde structs, with errors that give line,
-//! column and field.
+//! Files that users write or read: fields of TOML and JSON files as serde structs, whose errors give line, column and
+//! field.
 
 mod calibration_file;
 mod campaign;

@@ -1,4 +1,4 @@
-//! TOML text of the structs that read it, with remarks for people.
+//! TOML text that is generated from the structs that read it, with comments for users.
 
 use std::fmt::Display;
 
@@ -8,11 +8,11 @@ use serde_json::{Map, Value};
 /// Tables written inline, after the name of a field.
 const INLINE: [&str; 3] = ["accel_from", "columns", "instance"];
 
-/// Remarks on fields and tables by their path, `table.field`.
+/// Comments on fields and tables; the key is the path of the field, `table.field`.
 #[derive(Debug, Default)]
 pub struct Remarks {
     all: Vec<(String, Place, String)>,
-    /// The fields that must be completed, each with the reason.
+    /// The fields that the user must complete, each with the reason.
     pub open: Vec<(String, String)>,
 }
 
@@ -32,12 +32,12 @@ impl Remarks {
         self.add(path, Place::Before, remark);
     }
 
-    /// Adds the reason for a value.
+    /// Adds the reason for the value of a field.
     pub fn reason(&mut self, path: &str, why: impl Display) {
         self.add(path, Place::Behind, why);
     }
 
-    /// Adds the purpose of an optional field; its value, if any, becomes a comment.
+    /// Adds the purpose of an optional field; if the field has a value, the value becomes a comment.
     pub fn suggestion(&mut self, path: &str, why: impl Display) {
         self.add(path, Place::Suggestion, why);
     }
@@ -65,7 +65,7 @@ impl Remarks {
     }
 }
 
-/// The text of a document of this format with these fields.
+/// The text of a document in this format, with the given fields.
 pub fn text(format: &str, fields: &impl Serialize, remarks: &Remarks) -> String {
     let text = String::new();
     let mut page = Page { text, remarks };

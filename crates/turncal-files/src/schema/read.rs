@@ -26,15 +26,15 @@ const NOISE_OF_MEANS: f64 = 300.0 * MICRO_G_PER_SQRT_HZ;
 
 /// Reads `run.toml` and the files given in it, relative to itself.
 ///
-/// Everything is checked: known fields, finite and possible numbers, uniform time, overlapping files. Samples,
-/// nominal scales and priors are returned along right-front-up for any `body_axes`. Unstated site, noise, period
-/// and prior get wide defaults, with a note.
+/// Checks everything: that fields are known, numbers are finite and possible, times are uniform and files overlap. The
+/// samples, nominal scales and priors are along the right, front and up axes, whatever `body_axes` is. If the site,
+/// noise, period or prior is not stated, it gets a wide default, with a note.
 pub fn read_run(path: &Path) -> Result<Run, FileError> {
     run_of_text(path, &text_of(path)?, Some(path), &[])
 }
 
-/// Reads the text of a `run.toml` located (or assumed) next to this file and read from `source`; the files given in it
-/// may be in memory.
+/// Reads the text of a `run.toml` that is located (or assumed to be) next to this file and was read from `source`; the
+/// files that it names may be in memory.
 pub fn run_of_text(
     path: &Path,
     text: &str,
@@ -122,7 +122,7 @@ pub fn read_meta(path: &Path) -> Result<BTreeMap<String, String>, FileError> {
     Ok(meta)
 }
 
-/// Refuses a `run.toml` that [`crate::read_run`] would refuse for any content of the files given in it.
+/// Refuses a `run.toml` that [`crate::read_run`] would refuse whatever the named files contain.
 pub fn check(document: Document) -> Result<(), FileError> {
     let run = run_file(document)?;
     let mut fields = Fields::new(document, &run, &[]);
@@ -194,15 +194,17 @@ impl InstrumentFields<'_> {
         }
         if imu.is_of_means() {
             notes.push(format!(
-                "The rows are the means of {} positions, and their noise is not known. turncal assumed {}, that of a \
-                 second of a MEMS sensor. State velocity_random_walk_ug_per_sqrt_hz for rows of one second if you know it.",
+                "The rows are the means of {} positions, whose noise is unknown. turncal assumed {}, the noise of a \
+                 MEMS sensor averaged over one second. If you know the noise, state \
+                 velocity_random_walk_ug_per_sqrt_hz for rows of one second.",
                 imu.len(),
                 found.join(", ")
             ));
         } else if !found.is_empty() {
             notes.push(format!(
-                "You stated no white noise. turncal starts from the noise of the quieter part of the recording ({}) \
-                 and estimates it from there. If you know the data-sheet values, state them in [imu.noise].",
+                "run.toml states no white noise. turncal starts with the noise of the quieter part of the recording \
+                 ({}) and improves this estimate. If you know the values of the data sheet, state them in \
+                 [imu.noise].",
                 found.join(", ")
             ));
         }
@@ -220,7 +222,7 @@ impl InstrumentFields<'_> {
         let Some(period) = angle.filter(|&period| period > 0.0) else {
             return Err(FileError::of(
                 &self.log.source.file,
-                "rows without time stamps, and turns that are not good enough to estimate the sample period",
+                "rows without time stamps, and no turns with which to estimate the sample period",
                 "a time column or sample_period_s in run.toml",
                 "State sample_period_s (--rate).",
             ));
@@ -255,12 +257,12 @@ impl InstrumentFields<'_> {
         } else {
             (
                 "beyond",
-                " If the instrument clock is right and the time stamps are wrong, omit the time column.",
+                " If the clock of the instrument is right and the time stamps are wrong, omit the time column.",
             )
         };
         Some(format!(
-            "The time stamps are {period} s apart, {ppm:.2} ppm {way} than sample_period_s. turncal used the time \
-             stamps; this changes the scale factor of the {triad} by the same amount, {judged} its prior σ of \
+            "The time stamps are {period} s apart, which is {ppm:.2} ppm {way} than sample_period_s. turncal used the \
+             time stamps; this changes the scale factor of the {triad} by the same amount, {judged} its prior σ of \
              {sigma:.2} ppm.{advice}"
         ))
     }
@@ -284,8 +286,7 @@ impl Fields<'_> {
     fn site(&mut self) -> Result<Site, FileError> {
         let file = &self.run.site;
         if file.latitude_deg.is_none() && self.run.turntable.is_some() {
-            let meaning =
-                "the latitude (north positive), because a [turntable] run needs a known Earth rate";
+            let meaning = "the latitude (north positive), because Earth rate must be known for a run with a [turntable]";
             return Err(self.document.missing("site.latitude_deg", meaning));
         }
         let longitude = file.longitude_deg.map_or(0.0, |degrees| degrees.0 * DEGREE);

@@ -13,7 +13,7 @@ use turncal_input::{
     Positive,
 };
 
-/// The version of the format.
+/// The version of the file format.
 pub const FORMAT: &str = "turncal-run/1";
 
 /// Fields of `[meta]`.
@@ -53,13 +53,14 @@ pub struct RunFile {
 #[derive(Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SiteFile {
-    /// Latitude, degrees, north positive; required with a turntable. Default: turncal estimates Earth rate
+    /// Latitude, degrees, north positive; required with a turntable. Default: Earth rate is estimated
     pub latitude_deg: Option<Latitude>,
     /// Longitude, degrees; default 0
     pub longitude_deg: Option<Longitude>,
     /// Height above the ellipsoid, m; default 0 ± 500
     pub height_m: Option<Height>,
-    /// Measured gravity, m/s²; without gravity_sigma_mgal, σ follows from its last digit. Default: normal gravity
+    /// Measured gravity, m/s²; if gravity_sigma_mgal is omitted, its σ follows from the last digit. Default: normal
+    /// gravity
     pub gravity_m_s2: Option<Gravity>,
     /// 1σ of gravity, mGal
     pub gravity_sigma_mgal: Option<Milligals>,
@@ -68,7 +69,7 @@ pub struct SiteFile {
 #[derive(Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ImuFile {
-    /// Log of the IMU, relative to this file
+    /// Log of the IMU; the path is relative to this file
     pub file: String,
     /// Stream that contains the gyros, in a file with several streams
     pub stream: Option<String>,
@@ -76,10 +77,10 @@ pub struct ImuFile {
     pub accel_from: Option<AccelFromFile>,
     /// Magnetometer that is not in the rows of the gyros
     pub mag_from: Option<AccelFromFile>,
-    /// Use a damaged log up to the damage; default false
+    /// Use a damaged log up to the damage; default: false
     pub salvage: Option<bool>,
-    /// Content of a row: whole counts in the sample (pulse), the integral over the sample (increment) or the mean over
-    /// the sample (rate)
+    /// Quantity in a row: number of whole counts in the sample (pulse), integral over the sample (increment) or mean
+    /// over the sample (rate)
     pub output: Output,
     /// Unit of the gyros: count; for increments rad, deg, arcsec; for rates rad/s, deg/s, mdps, deg/h
     pub gyro_unit: Option<String>,
@@ -87,25 +88,25 @@ pub struct ImuFile {
     pub accel_unit: Option<String>,
     /// Unit of the magnetometer: uT, nT, mT, T, G, mG or count
     pub mag_unit: Option<String>,
-    /// End of the range of the gyros, in the unit of a row; samples there are saturated
+    /// End of the range of the gyros, in the unit of a row; samples with this value are saturated
     pub gyro_full_scale: Option<Positive>,
-    /// End of the range of the accelerometers, in the unit of a row; samples there are saturated
+    /// End of the range of the accelerometers, in the unit of a row; samples with this value are saturated
     pub accel_full_scale: Option<Positive>,
-    /// Unit of the time column: s (default), ms, us, ns, a tick in s, or count for a sample counter
+    /// Unit of the time column: s (default), ms, us, ns, the duration of a tick in s, or count for a sample counter
     pub time_unit: Option<TimeUnitField>,
-    /// Time from row to row, s; default from the time stamps
+    /// Time from row to row, s; default: from the time stamps
     pub sample_period_s: Option<Positive>,
-    /// 1σ of the sample period, ppm; default 10000 without a time column and a [turntable], otherwise 0
+    /// 1σ of the sample period, ppm; default: 10000 without a time column and a [turntable], otherwise 0
     pub sample_period_sigma_ppm: Option<NonNegative>,
     /// Whether a stamp marks the end, the start or the middle of its sample
     pub time_stamp: TimeStamp,
-    /// False if the file contains concatenated sections; default true
+    /// False if the file contains concatenated sections; default: true
     pub continuous: Option<bool>,
     /// Unit of the temperature columns: degC (default), K or degF
     pub temperature_unit: Option<TemperatureUnit>,
     /// Axes of the log: rfu right-front-up (default), frd or flu
     pub body_axes: Option<BodyAxes>,
-    /// Use only the rows of one instrument of several
+    /// Use only the rows of one of several instruments
     pub instance: Option<InstanceFile>,
     /// Names or numbers of the columns; a minus before a name reverses its sign
     pub columns: ImuColumns,
@@ -113,10 +114,11 @@ pub struct ImuFile {
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, NonNegative>")]
     pub noise: BTreeMap<String, Option<NonNegative>>,
-    /// Knowledge of the triads before the calibration
+    /// Prior knowledge of the triads, before the calibration
     #[serde(default)]
     pub prior: PriorsFile,
-    /// Error terms to estimate, by name, such as time-offset; sigma = 0: known to be absent
+    /// Error terms to estimate, by name, such as time-offset; sigma = 0 states that the instrument does not have the
+    /// term
     #[serde(default)]
     pub terms: BTreeMap<String, TermFile>,
 }
@@ -151,7 +153,7 @@ impl ImuFile {
 #[derive(Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AccelFromFile {
-    /// Log of the sensor; default: the log of the gyros
+    /// Log of the sensor; default: that of the gyros
     pub file: Option<String>,
     /// Stream that contains the sensor
     pub stream: Option<String>,
@@ -165,7 +167,7 @@ pub struct AccelFromFile {
     pub sample_period_s: Option<Positive>,
 }
 
-/// The column that distinguishes instruments, and its value for the selected one.
+/// The column that distinguishes the instruments, and its value for the selected instrument.
 #[derive(Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct InstanceFile {
@@ -241,37 +243,37 @@ pub struct PriorsFile {
 pub struct PriorFile {
     /// Nominal scale factor: output per second for 1 rad/s or 1 m/s²; optional if the unit implies it
     pub scale: Option<OneOrThree>,
-    /// 1σ of the scale factor, ppm; default 50 000
+    /// 1σ of the scale factor, ppm; default: 50 000
     pub scale_sigma_ppm: Option<OneOrThree>,
-    /// 1σ of each misalignment, ″; default 7200
+    /// 1σ of each misalignment, ″; default: 7200
     pub installation_sigma_arcsec: Option<OneOrThree>,
-    /// Expected bias, in output per second; default 0
+    /// Expected bias, in output per second; default: 0
     pub bias: Option<OneOrThree>,
-    /// 1σ of the bias, in output per second; default 2 °/s or 1 m/s²
+    /// 1σ of the bias, in output per second; default: 2 °/s or 1 m/s²
     pub bias_sigma: Option<OneOrThree>,
 }
 
 #[derive(Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StandstillFile {
-    /// White 1σ of the velocity in a dwell, m/s; default from the dwells
+    /// 1σ of the velocity in a dwell (white), m/s; default: estimated from the dwells
     pub velocity_sigma_m_s: Option<Positive>,
-    /// White 1σ of the attitude in a dwell without a table, ″; default from the dwells
+    /// 1σ of the attitude in a dwell without a table (white), ″; default: estimated from the dwells
     pub attitude_sigma_arcsec: Option<Positive>,
     /// Random walk of the attitude in a dwell without a table, °/√s
     pub turning_deg_per_sqrt_s: Option<NonNegative>,
-    /// Distance of the IMU from the table's centre, 1σ, m; default 1
+    /// 1σ of the distance of the IMU from the table centre, m; default: 1
     pub position_sigma_m: Option<Positive>,
 }
 
 #[derive(Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TurntableFile {
-    /// Log of the turntable, relative to this file
+    /// Log of the turntable; the path is relative to this file
     pub file: String,
     /// Stream that contains the attitude, in a file with several streams
     pub stream: Option<String>,
-    /// Use a damaged log up to the damage; default false
+    /// Use a damaged log up to the damage; default: false
     pub salvage: Option<bool>,
     /// Unit of the time column
     pub time_unit: Option<TimeUnitField>,
@@ -285,11 +287,11 @@ pub struct TurntableFile {
     pub position_sigma_arcsec: Angle,
     /// 1σ per axis of the white error of each reading, ″
     pub reading_sigma_arcsec: Angle,
-    /// 1σ per axis of the error of a reading just after a stop, ″; fades within a second
+    /// 1σ per axis of the error of a reading just after a stop, ″; the error fades within a second
     pub settling_sigma_arcsec: Option<Angle>,
-    /// 1σ of the base's tilt, ″; switches its estimation on
+    /// 1σ of the tilt of the table base, ″; if it is stated, the tilt is estimated
     pub level_sigma_arcsec: Option<Angle>,
-    /// 1σ of the base's azimuth, ″; switches its estimation on
+    /// 1σ of the azimuth of the table base, ″; if it is stated, the azimuth is estimated
     pub north_sigma_arcsec: Option<Angle>,
     /// 1σ of the tilt of each inner axis, ″; needs angles
     pub nonorthogonality_sigma_arcsec: Option<Angle>,
@@ -302,7 +304,7 @@ pub struct TurntableFile {
 }
 
 impl TurntableFile {
-    /// Errors of the table axes, with their keys and 1σ.
+    /// Errors of the table axes, with the keys and the 1σ of each.
     pub fn axis_errors(&self) -> [(AxisError, &'static str, Option<Angle>); 3] {
         let nonorthogonality = self.nonorthogonality_sigma_arcsec;
         let (wobble, encoder) = (self.wobble_sigma_arcsec, self.encoder_sigma_arcsec);
@@ -318,7 +320,7 @@ impl TurntableFile {
     }
 }
 
-/// A quaternion `[w, x, y, z]`, or angles about axes, outermost first, or both.
+/// A quaternion `[w, x, y, z]`, or the angles about the table axes, outermost axis first, or both.
 #[derive(Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TableColumns {
@@ -328,16 +330,16 @@ pub struct TableColumns {
     pub quaternion: Option<Names<4>>,
     /// Axis angles, degrees, outermost first
     pub angles: Option<Vec<String>>,
-    /// Axis of each angle, as in axes of the turntable
+    /// Axis of each angle, as in the field axes of the turntable
     pub axes: Option<Vec<String>>,
 }
 
 #[derive(Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SegmentsFile {
-    /// CSV file with start, end and label of each section, relative to this file
+    /// CSV file with the start, end and label of each section; the path is relative to this file
     pub file: String,
-    /// 1σ per axis of a position set by hand, degrees; default 1
+    /// 1σ per axis of a position set by hand, degrees; default: 1
     pub position_sigma_deg: Option<Positive>,
 }
 

@@ -26,7 +26,7 @@ impl BodyAxes {
     }
 }
 
-/// The moment within a sample that its time stamp marks.
+/// The part of a sample that its time stamp marks.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema,
 )]
@@ -83,7 +83,7 @@ pub enum TimeUnitField {
 }
 
 impl TimeUnitField {
-    /// The unit of time from its text in a file.
+    /// Parses the name of a unit of time in a file.
     pub fn of_text(text: &str) -> Self {
         match text.parse() {
             Ok(tick) => Self::Tick(Positive(tick)),

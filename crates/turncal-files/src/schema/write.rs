@@ -1,4 +1,4 @@
-//! A [`Run`] as a run directory.
+//! Writes a [`Run`] as a run directory.
 
 use super::calibration_json;
 use std::collections::BTreeMap;
@@ -36,8 +36,9 @@ const ANGLES: [&str; 3] = ["outer", "middle", "inner"];
 
 /// Writes a run into an existing directory: `run.toml`, `imu.csv.gz`, `table.csv.gz`, `segments.csv`, `truth.json`.
 ///
-/// [`crate::read_run`] returns the same run, except for rounding in the last digit, its name (that of the directory) and its
-/// notes. The same run gives the same bytes. `run.instrument.unit` must be a unit of this `output`.
+/// [`crate::read_run`] returns the same run, except for rounding in the last digit, the name (which becomes that of the
+/// directory) and the notes. The same run always gives the same bytes. `run.instrument.unit` must be a unit of this
+/// `output`.
 pub fn write_run(
     directory: &Path,
     run: &Run,
@@ -327,7 +328,10 @@ fn turntable_file(run: &Run) -> TurntableFile {
 
 fn remarks(run: &Run) -> Remarks {
     let mut remarks = Remarks::default();
-    remarks.before("imu", "instrument samples along body right-front-up");
+    remarks.before(
+        "imu",
+        "samples of the instrument along the body axes right, front, up",
+    );
     remarks.before(
         "imu.prior.gyro",
         "known before calibration: N = scale * installation * u + bias, with N in the file's quantity per second",

@@ -1,10 +1,10 @@
-//! Sample number of each row, from stamps with jitter, delays, bursts and missing rows.
+//! Determines the sample number of each row from stamps with jitter, delays, bursts and missing rows.
 
 use std::collections::VecDeque;
 
 use super::median;
 
-/// Number of rows that reveal that an earlier one is late: no burst is longer, and an approximate period suffices over
+/// Number of later rows that can reveal that a row is late. No burst is longer, and an approximate period suffices over
 /// so few rows.
 pub const REACH: usize = 128;
 /// Fraction of the difference of a stamp by which the clock phase follows it, small enough to average jitter …
@@ -115,7 +115,7 @@ fn phase(times: &[f64], period: f64) -> f64 {
     f64::atan2(sin, cos) / turn
 }
 
-/// Row times, with late rows at the latest time allowed by the following rows.
+/// Row times, in which late rows are moved to the latest time that the following rows allow.
 ///
 /// Each row was sampled one period before the next. A stamp that contradicts this by more than a period, beyond jitter
 /// and rounding, is due to a busy logger or a burst.
@@ -152,7 +152,7 @@ const SPAN: usize = 8;
 /// Spans without a gap differ from their median by less than this, in samples.
 const NO_GAP: f64 = 0.8;
 
-/// Mean step without missing rows, free of the rounding of single printed steps.
+/// Mean time step without missing rows, unaffected by the rounding of single printed times.
 pub fn mean_step(stamps: &[(f64, u64)]) -> f64 {
     let rows = stamps.len() - 1;
     // Missing rows make this step longer, never shorter.

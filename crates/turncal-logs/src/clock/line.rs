@@ -1,4 +1,4 @@
-//! The common line of all stamps of a log: the uniform clock of its samples.
+//! The line through all stamps of a log, which is the uniform clock of its samples.
 
 use std::path::{Path, PathBuf};
 
@@ -14,13 +14,13 @@ pub struct Uniform {
     pub first: f64,
     /// Sample period, s.
     pub period: f64,
-    /// Sample number of each row, from 0. Empty if the numbers were delivered one by one.
+    /// Sample number of each row, from 0. Empty if the sample numbers were returned one by one.
     pub numbers: Vec<usize>,
-    /// Stamps relative to due times, s; for drifting samples, relative to their own times.
+    /// Deviations of the stamps from the due times, s; for drifting samples, from their own times.
     pub jitter_rms: f64,
     /// Largest deviation from uniform times, s.
     pub jitter_max: f64,
-    /// Period divided by the given one, minus one, if the stamps contradict it.
+    /// Fitted period divided by the given period, minus one, if the stamps contradict the given period.
     pub off_given: Option<f64>,
     /// Sample times, if they deviate from the due times by more than half a sample.
     pub wander: Option<Wander>,
@@ -40,13 +40,13 @@ impl Uniform {
         Ok(Self { numbers, ..clock })
     }
 
-    /// Time of a sample after the due time of the first, s; may be fractional.
+    /// Time from the due time of the first sample to this sample, s; the sample number may be fractional.
     pub fn time(&self, number: f64) -> f64 {
         let time = self.wander.as_ref().map(|wander| wander.time(number));
         time.unwrap_or(number) * self.period
     }
 
-    /// Sample number at a time after the due time of the first, s.
+    /// Sample number at this time after the due time of the first sample, s.
     pub fn number(&self, time: f64) -> f64 {
         let time = time / self.period;
         let number = self.wander.as_ref().map(|wander| wander.number(time));
@@ -66,8 +66,8 @@ impl Uniform {
         }
         (self.jitter_max > self.period).then(|| {
             format!(
-                "Time stamps jitter by up to {}, more than the sample period of {sample}. turncal fitted a uniform \
-                    clock to them.",
+                "The time stamps jitter by up to {}, more than the sample period of {sample}. turncal fitted a \
+                 uniform clock to the time stamps.",
                 ms(self.jitter_max),
             )
         })
@@ -356,7 +356,7 @@ fn gap(file: &Path, before: f64, (time, line): (f64, u64)) -> FileError {
         Place::Line(line),
         format_args!("a gap in time from {before} s to {time} s"),
         "fewer missing rows than recorded rows",
-        "Correct the clock, or split the recording there.",
+        "Correct the clock, or split the recording at this gap.",
     )
 }
 
@@ -365,7 +365,7 @@ fn not_forward(file: &Path, line: u64) -> FileError {
         file,
         Place::Line(line),
         "times that stop increasing here",
-        "times that increase with every row",
+        "times that increase from row to row",
         "Correct the time column, remove these rows, or name another time column in run.toml.",
     )
 }

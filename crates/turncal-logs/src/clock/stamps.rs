@@ -40,7 +40,7 @@ impl Clock<'_> {
 /// Position of a row by its stamp: number of kept rows before it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stamp {
-    /// The row is kept, after this number of kept rows.
+    /// The row is kept; this many kept rows precede it.
     New(usize),
     /// The stamp equals that of the previous row.
     Again(usize),
@@ -97,7 +97,7 @@ pub struct Stamps {
 }
 
 impl Stamps {
-    /// A copy for which times must be unique.
+    /// Returns a copy that requires unique times.
     pub fn without_bursts(self) -> Self {
         Self {
             bursts: false,
@@ -105,7 +105,7 @@ impl Stamps {
         }
     }
 
-    /// Accepts the row unless it duplicates a row at its time; `is_same` compares the values.
+    /// Accepts the row unless it duplicates a row with the same time; `is_same` compares the values.
     pub fn take(
         &mut self,
         csv: &LogRows,
@@ -133,7 +133,7 @@ impl Stamps {
             return Err(csv.error_here(
                 "the same time as in the previous row, but other values",
                 "a later time",
-                "Remove the wrong one of the two rows, or log the time with more digits.",
+                "Remove the wrong row of the two, or log the time with more digits.",
             ));
         }
         if self.is_set_to(place, csv)? {
@@ -315,7 +315,7 @@ impl Stamps {
         });
     }
 
-    /// Sample time for this logged time, with shortened pauses.
+    /// Sample time for this logged time, after pauses have been shortened.
     pub fn told(&self, time: f64) -> f64 {
         // Samples begin about where their stamps are.
         let behind = |pause: &Pause| pause.until - 0.5 * BREAK <= time;
@@ -336,7 +336,7 @@ impl Stamps {
         self.cut(step);
         self.set.push(format!(
             "line {}: the time jumps from {} to {} because the clock was set, so the length of the gap is unknown. \
-                turncal treats the rest as a separate stretch and shifts its times by {} s.",
+             turncal treats the following rows as a separate stretch and shifts their times by {} s.",
             csv.line(),
             self.words(before),
             self.words(before + step),
@@ -350,7 +350,7 @@ impl Stamps {
         csv.error_here(
             format_args!("a time that steps back from {from} to {to}"),
             "increasing times",
-            "Sort the rows, name another time column, or split the file where the clock was set.",
+            "Sort the rows, name another time column, or split the file at the line where the clock was set.",
         )
     }
 
@@ -393,8 +393,8 @@ impl Stamps {
         let ends = self.pauses.first().zip(self.pauses.last());
         notes.extend(ends.map(|(first, last)| {
             format!(
-                "{file}: recording paused {}, first before line {}, for longer in total than it ran. turncal counts \
-                 {BREAK} s of each pause as missing rows and ignores the other {} s.",
+                "{file}: the recording paused {}, first before line {}, and the pauses are longer in total than the \
+                 recording. turncal counts {BREAK} s of each pause as missing rows and ignores the other {} s.",
                 counted(self.pauses.len(), "time"),
                 first.line,
                 nanoseconds(last.left_out)
@@ -422,9 +422,9 @@ impl Stamps {
             )),
             TimeUnit::Count => (missing > 0).then(|| {
                 format!(
-                    "Rows are missing, and the counter wraps every {} samples ({} s). Each gap may be longer by one or \
-                        more of these periods; all later times are then too early by as much. Use a time that does not \
-                        wrap, or split the recording at the gaps.",
+                    "Rows are missing, and the counter wraps every {} samples ({} s). Each gap may be longer by one \
+                     or more of these periods; all later times would then be too early by the same amount. Use a time \
+                     that does not wrap, or split the recording at the gaps.",
                     (size / self.period()).round(),
                     nanoseconds(size)
                 )

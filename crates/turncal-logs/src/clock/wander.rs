@@ -34,7 +34,7 @@ impl Knots {
         }
     }
 
-    /// Includes the remaining rows, if they suffice to separate drift from jitter.
+    /// Includes the remaining rows, if there are enough of them to separate drift from jitter.
     pub fn finish(mut self) -> Self {
         if 2 * self.rows.len() >= ROWS || self.knots.is_empty() {
             self.tie();
@@ -66,7 +66,7 @@ impl Knots {
     }
 
     /// Drift relative to a clock of this period, with an offset and a period difference to the reference clock; `None`
-    /// if the stamps are close enough to it. `Err` is the line where times do not increase.
+    /// if the stamps are close enough to it. `Err` contains the line at which the times do not increase.
     pub fn wander(&self, later: f64, longer: f64, period: f64) -> Result<Option<Wander>, u64> {
         let knots = self.knots.iter().map(|knot| {
             let off = (knot.off - later - knot.number * longer) / period;
@@ -96,7 +96,7 @@ impl Wander {
         self.between(behind, |(knot, off)| (knot, knot + off), number)
     }
 
-    /// The sample of a time.
+    /// The sample at a given time.
     pub fn number(&self, time: f64) -> f64 {
         let behind = self
             .knots

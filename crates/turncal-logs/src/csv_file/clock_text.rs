@@ -130,7 +130,7 @@ impl ClockText {
         whole + count / 10f64.powi(i32::try_from(digits).unwrap_or(0))
     }
 
-    /// Remark on assumptions about its texts, if any.
+    /// Remark on assumptions about the texts of the column, if any were made.
     pub fn remark(self, name: &str) -> Option<String> {
         let digits = self.unpadded?;
         Some(format!(

@@ -40,7 +40,7 @@ pub struct Heading {
     pub rate: Option<f64>,
     /// Statements of the file that are ignored or interpreted.
     pub remarks: Vec<String>,
-    /// Number of first lines that are not rows.
+    /// Number of lines at the beginning that are not rows.
     pub above: usize,
     /// Number of rows among the first lines.
     pub rows: usize,
@@ -66,14 +66,16 @@ struct Look {
 
 impl Look {
     fn of(line: &Line) -> Self {
-        let comment = line.comment();
+        // A mark with a separator behind it is the name of the first column.
+        let is_inside = |of: &&[u8]| !matches!(of.first(), Some(b',' | b';' | b'\t'));
+        let comment = line.comment().filter(is_inside);
         let text = text_of(comment.unwrap_or(&line.text));
         // Tabs may stand for fields without a value.
         let text = text.trim_matches(' ').to_owned();
         let delimiter = Delimiter::of_row(&text);
         Self {
             number: line.number,
-            is_comment: comment.is_some(),
+            is_comment: line.comment().is_some(),
             delimiter,
             fields: delimiter.fields(&text),
             text,
@@ -152,7 +154,11 @@ impl Shape {
         }
         let most = shapes
             .into_iter()
-            .max_by_key(|((_, columns), (rows, numbers))| (*columns > 1, *rows, *numbers));
+            .max_by_key(|((delimiter, columns), (rows, numbers))| {
+                // Blanks may stand within a field, as in a date.
+                let is_byte = *delimiter != Delimiter::Blanks;
+                (*columns > 1, *rows, *numbers, is_byte)
+            });
         let ((delimiter, mut columns), _) = most?;
         let rows = rows.iter().filter_map(|row| row.fields(delimiter, columns));
         let rows: Vec<Vec<String>> = rows.collect();
@@ -202,7 +208,7 @@ impl Looks {
         Self(lines.map(Look::of).collect())
     }
 
-    /// Samples of a labelled stream, and the other lines.
+    /// The samples of a labelled stream, and the other lines.
     pub fn of_stream<'a>(
         lines: impl Iterator<Item = &'a Line>,
         labelled: &Labelled,
@@ -222,8 +228,7 @@ impl Looks {
                         text,
                     })
                 }
-                Added::Part => None,
-                Added::Nothing if labelled.knows(&line.text) => None,
+                Added::Part | Added::Other => None,
                 Added::Nothing => Some(Look::of(line)),
             }
         });
@@ -339,6 +344,11 @@ impl Looks {
         if is_longer && own.is_none() {
             return self.unnamed(shape, first, tag.is_some());
         }
+        if own.is_none()
+            && let Some(named) = tag.and_then(|(tags, tag)| self.listed(tags, tag, columns))
+        {
+            return Ok(named);
+        }
         let Some(last) = own.or_else(|| (0..first).rfind(is_shared)) else {
             return self.unnamed(shape, first, tag.is_some());
         };
@@ -354,6 +364,29 @@ impl Looks {
             line: looks[begin].number,
             above: if tag.is_some() { 0 } else { last + 1 },
             cut: None,
+        })
+    }
+
+    /// The column names from a line that lists them behind the tag, as in logs that describe their own rows.
+    fn listed(&self, tags: &Tags, tag: &str, columns: usize) -> Option<Named> {
+        let is_word = |word: &String| word.starts_with(char::is_alphabetic);
+        self.0.iter().find_map(|look| {
+            let fields = look.fields.as_ref().ok()?;
+            let behind = fields.iter().position(|field| field == tag)? + 1;
+            let begin = (fields.len() + 1).checked_sub(columns)?;
+            let words = fields.get(begin.max(behind)..)?;
+            let is_list = tags.column == 0 && words.len() + 1 == columns;
+            let are_names = is_list && behind > 1 && words.iter().all(is_word);
+            are_names.then(|| Named {
+                names: std::iter::once(tag)
+                    .chain(words.iter().map(String::as_str))
+                    .map(str::to_owned)
+                    .collect(),
+                units: None,
+                line: look.number,
+                above: 0,
+                cut: None,
+            })
         })
     }
 
@@ -377,14 +410,16 @@ impl Looks {
             return Err(stop);
         }
         let fields = shape.delimiter.fields(&look.text).unwrap_or_default();
+        let is_word = |field: &String| field.contains(char::is_alphanumeric) || field.is_empty();
         let is_near = fields.len() > 2
+            && fields.iter().all(is_word)
             && (shape.delimiter != Delimiter::Blanks || fields.len().abs_diff(columns) < 2);
         let has_numbers = fields.iter().any(|field| is_number(field));
         Ok(match look.fields(shape.delimiter, columns) {
             None if !is_near => numbered(first),
             None if has_numbers => Named {
                 cut: Some(format!(
-                    "Line {} has {} fields, the rows below it have {columns}. turncal left it out.",
+                    "Line {} has {} fields, but the rows below it have {columns}. turncal omitted this line.",
                     look.number,
                     fields.len()
                 )),
@@ -409,8 +444,8 @@ impl Looks {
         })
     }
 
-    /// Tags of rows of several kinds: words, or small numbers before a time, in rows with different widths or too few
-    /// columns for both triads.
+    /// Tags that distinguish several kinds of rows. Tags are words, or small numbers before a time, in rows that have
+    /// different widths or too few columns for both triads.
     pub fn tags(&self) -> Option<Tags> {
         let rows = || {
             self.0
@@ -436,11 +471,16 @@ impl Looks {
             };
             let width = kinds.values().next()?[0].len();
             let is_ragged = kinds.values().any(|rows| rows[0].len() != width);
+            // Each kind has its own time; a label of a movement leaves the time of all rows as it is.
+            let have_times = || {
+                let all: Vec<_> = rows().filter(|row| row.len() == width).collect();
+                !goes_on(&all) && kinds.values().all(|rows| goes_on(rows))
+            };
             let are_kinds = (2..=MOST_TAGS).contains(&kinds.len())
                 && 10 * of_kinds >= 9 * rows().count()
                 && (kinds.keys().all(is_word)
                     || are_digits && kinds.values().all(|rows| goes_on(rows)))
-                && (is_ragged || kinds.values().all(is_narrow));
+                && (is_ragged || kinds.values().all(is_narrow) || have_times());
             are_kinds.then(|| Tags {
                 column,
                 names: kinds.into_keys().map(str::to_owned).collect(),
@@ -463,7 +503,7 @@ fn clocks(rows: &[Vec<String>], columns: usize) -> Vec<Option<ClockText>> {
 fn orientation(says: &[&str]) -> Option<String> {
     let letters = value(says, "orientation")?;
     Some(format!(
-        "turncal did not apply the orientation {letters} that the file states; the columns were used unchanged."
+        "turncal did not apply the orientation {letters} that the file states; it used the columns unchanged."
     ))
 }
 
@@ -580,7 +620,16 @@ fn text_of(bytes: &[u8]) -> String {
 /// Whether a field is a number, with a point or a comma.
 fn is_number(field: &str) -> bool {
     // A comma after the last digit separates fields.
-    !field.ends_with(',') && field.replacen(',', ".", 1).parse::<f64>().is_ok()
+    !field.ends_with(',') && (field.parse::<f64>().is_ok() || other_number(field).is_some())
+}
+
+/// A number with a decimal comma, or with an exponent as in Fortran.
+pub fn other_number(text: &str) -> Option<f64> {
+    let is_digit = |c: char| c.is_ascii_digit() || "+-.,dDeE".contains(c);
+    let has_digit = text.contains(|c: char| c.is_ascii_digit());
+    (has_digit && text.chars().all(is_digit)).then_some(())?;
+    let text = text.replacen(',', ".", 1).replacen(['d', 'D'], "e", 1);
+    text.parse().ok()
 }
 
 /// Field separator of a row.
@@ -588,12 +637,12 @@ fn is_number(field: &str) -> bool {
 pub enum Delimiter {
     /// A single byte.
     Byte(u8),
-    /// Any number of spaces and tabs.
+    /// Fields are separated by any number of spaces and tabs.
     Blanks,
 }
 
 impl Delimiter {
-    /// The separator in a first row.
+    /// The separator used in a first row.
     pub fn of_row(row: &str) -> Self {
         let blanks = Self::Blanks.fields(row).unwrap_or_default();
         if blanks.len() > 1 && blanks.iter().all(|field| is_number(field)) {
@@ -624,7 +673,7 @@ impl Delimiter {
         )
     }
 
-    /// Separator byte in the returned lines.
+    /// The byte that separates fields in the returned lines.
     pub fn byte(self) -> u8 {
         match self {
             Self::Byte(byte) => byte,
@@ -637,7 +686,7 @@ impl Delimiter {
         self.byte() != b','
     }
 
-    /// Leaves one delimiter between two fields.
+    /// Reduces the delimiters between two fields to one.
     pub fn tidy(self, line: &mut Vec<u8>) {
         if self == Self::Blanks {
             collapse_blanks(line);

@@ -1,4 +1,4 @@
-//! Kind of the rows of a text, to distinguish rows from other lines as they arrive.
+//! The layout of the rows of a text, used to distinguish rows from other lines as they arrive.
 
 use super::heading::Delimiter;
 use super::lines::{comment, has_content};
@@ -16,7 +16,7 @@ pub struct RowKind {
 }
 
 impl RowKind {
-    /// The kind of a row; None if the line is not a row of numbers.
+    /// The layout of a row; `None` if the line is not a row of numbers.
     pub fn of(line: &[u8]) -> Option<Self> {
         let delimiter = delimiter_of(line);
         let row = split(line, delimiter);
@@ -30,7 +30,7 @@ impl RowKind {
         })
     }
 
-    /// Checks that a line is a row of this kind; the error gives what was found and expected.
+    /// Checks that a line is a row with this layout; the error states what was found and what was expected.
     pub fn check(&self, line: &[u8]) -> Result<(), String> {
         let row = split(line, self.delimiter);
         let (found, expected) = (row.len(), self.are_numbers.len());
@@ -55,7 +55,7 @@ impl RowKind {
         Ok(())
     }
 
-    /// Whether a line has a word for each column.
+    /// Whether a line contains a word for each column.
     pub fn is_names(&self, line: &[u8]) -> bool {
         [self.delimiter, delimiter_of(line)]
             .into_iter()

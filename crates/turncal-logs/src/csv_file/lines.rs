@@ -1,4 +1,4 @@
-//! Lines of a text in UTF-8 or UTF-16 with any usual line ending. The memory used per file is limited here for all
+//! Lines of a text in UTF-8 or UTF-16 with any usual line ending. This module limits the memory used per file, for all
 //! callers.
 
 use std::collections::VecDeque;
@@ -23,13 +23,13 @@ pub struct Line {
 }
 
 impl Line {
-    /// The text of a comment, if the line is one.
+    /// The text of the comment, if the line is a comment.
     pub fn comment(&self) -> Option<&[u8]> {
         comment(&self.text)
     }
 }
 
-/// The text of a comment, if the line is one.
+/// The text of the comment, if the line is a comment.
 pub fn comment(line: &[u8]) -> Option<&[u8]> {
     let text = line.trim_ascii_start();
     let marks = [&b"#"[..], b"%", b"//"];
@@ -61,7 +61,7 @@ impl From<io::Error> for Stop {
     }
 }
 
-/// The lines of a file, with a look-ahead at the first ones.
+/// The lines of a file; the first lines can be examined before they are read.
 pub struct Lines {
     source: Box<dyn BufRead>,
     /// Line ending.

@@ -1,4 +1,4 @@
-//! One line as fields.
+//! The fields of one line.
 
 /// Maximum number of columns, as in a spreadsheet.
 pub const MOST_COLUMNS: usize = 16_384;

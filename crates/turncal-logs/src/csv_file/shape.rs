@@ -1,7 +1,7 @@
-//! Lines by their shape: the words and signs of a line, with every number and time replaced by a mark.
+//! The shape of a line: its words and signs, with every number and time replaced by a mark.
 //!
-//! Shapes that repeat are streams of samples. The text before a mark is the name of its value; a line with a rare shape
-//! is a remark, a damaged row or the text of a starting device.
+//! Lines whose shapes repeat form streams of samples. The text before a mark is the name of its value; a line with a
+//! rare shape is a remark, a damaged row or the text of a starting device.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -52,13 +52,14 @@ impl<'a> Marked<'a> {
             let byte = text[at];
             is_in_word = byte.is_ascii_alphanumeric() || byte == b'_' || byte >= 0x80;
             if byte.is_ascii_whitespace() {
-                if shape.last() != Some(&b' ') {
-                    shape.push(b' ');
-                }
+                let blanks = rest.iter().take_while(|of| of.is_ascii_whitespace());
+                let has_tab = blanks.clone().any(|of| *of == b'\t');
+                shape.push(if has_tab { b'\t' } else { b' ' });
+                at += blanks.count();
             } else {
                 shape.push(byte);
+                at += 1;
             }
-            at += 1;
         }
         if text.len() < whole.len() {
             shape.push(b'*');
@@ -112,7 +113,7 @@ fn number(text: &[u8], comma: bool) -> Option<usize> {
     } else {
         0
     };
-    if let Some(b'e' | b'E') = text.get(at) {
+    if let Some(b'e' | b'E' | b'd' | b'D') = text.get(at) {
         let sign = usize::from(matches!(text.get(at + 1), Some(b'+' | b'-')));
         let exponent = digits(&text[at + 1 + sign..]);
         at += if exponent > 0 { 1 + sign + exponent } else { 0 };
@@ -202,25 +203,51 @@ fn clock(text: &[u8]) -> usize {
 
 /// Length of a word that mixes digits and letters, like a hexadecimal number.
 fn mixed(text: &[u8], is_in_word: bool) -> Option<(usize, u8)> {
-    let length = text
-        .iter()
-        .take_while(|byte| byte.is_ascii_alphanumeric())
-        .count();
-    let word = &text[..length];
-    let is_mixed =
-        word.first().is_some_and(u8::is_ascii_digit) && word.iter().any(u8::is_ascii_alphabetic);
-    (!is_in_word && is_mixed).then_some((length, WORD))
+    let word = |with: &[u8]| {
+        let is_part = |byte: &&u8| byte.is_ascii_alphanumeric() || with.contains(byte);
+        &text[..text.iter().take_while(is_part).count()]
+    };
+    let with_points = word(b".");
+    let has_points = with_points.iter().filter(|byte| **byte == b'.').count() > 1;
+    let word = if has_points { with_points } else { word(b"") };
+    let is_mixed = has_points || word.iter().any(u8::is_ascii_alphabetic);
+    let is_word = word.first().is_some_and(u8::is_ascii_digit) && is_mixed;
+    (!is_in_word && is_word).then_some((word.len(), WORD))
+}
+
+/// The last line that named the deeper lines below it, as in YAML.
+#[derive(Debug, Default)]
+struct Section {
+    indent: usize,
+    name: Vec<u8>,
+}
+
+impl Section {
+    /// A line with the name of its section before its shape.
+    fn marked<'a>(&mut self, line: &'a [u8], comma: bool) -> Marked<'a> {
+        let mut marked = Marked::of(line, comma);
+        let indent = line.len() - line.trim_ascii_start().len();
+        if !marked.marks.is_empty() {
+            if indent > self.indent {
+                marked.shape.splice(0..0, self.name.iter().copied());
+            }
+        } else if let Some(name) = marked.shape.strip_suffix(b":") {
+            self.indent = indent;
+            self.name = [name, b" "].concat();
+        }
+        marked
+    }
 }
 
 /// Successive lines of these shapes that form one sample.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Stream {
-    /// A word that distinguishes the stream from the others in its file.
+    /// A word that distinguishes the stream from the other streams in the file.
     pub name: String,
     shapes: Vec<Vec<u8>>,
-    /// Names of its values; empty if there is no word before a value.
+    /// Names of the values in a sample; a name is empty if no word precedes the value.
     pub names: Vec<String>,
-    /// Units of its values; empty if not stated.
+    /// Units of the values in a sample; empty if not stated.
     pub units: Vec<String>,
 }
 
@@ -229,6 +256,8 @@ pub struct Stream {
 pub struct Labelled {
     comma: bool,
     pub streams: Vec<Stream>,
+    /// Shapes of lines without numbers that repeat.
+    between: Vec<Vec<u8>>,
 }
 
 impl Labelled {
@@ -240,12 +269,19 @@ impl Labelled {
             .filter(|line| has_decimal_comma(&line.text))
             .count()
             > count;
-        let marked = lines.map(|line| Marked::of(&line.text, comma));
+        let mut section = Section::default();
+        let marked = lines.clone().map(|line| section.marked(&line.text, comma));
         let mut kinds: Vec<Kind> = Vec::new();
         let mut places = HashMap::new();
         // Indices of the kinds of all lines with numbers.
         let mut order = Vec::new();
-        for line in marked.filter(|line| !line.marks.is_empty()) {
+        let mut between = HashMap::new();
+        for line in marked {
+            // An item of a list has no name.
+            if line.marks.is_empty() || line.shape.starts_with(b"- ") {
+                *between.entry(line.shape).or_insert(0) += 1;
+                continue;
+            }
             let place = *places.entry(line.shape.clone()).or_insert(kinds.len());
             if place == kinds.len() {
                 kinds.push(Kind::of(&line));
@@ -257,14 +293,20 @@ impl Labelled {
         let is_stream = |place: &usize| kinds[*place].count >= least;
         let streams = kinds.iter().filter(|kind| kind.count >= least);
         let rows: usize = streams.clone().map(|kind| kind.count).sum();
-        let labelled = streams.clone().filter(|kind| is_labelled(&kind.shape));
+        let is_of_table = |kind: &Kind| {
+            let mut lines = lines.clone();
+            lines.any(|line| names_fields(&line.text, &kind.shape))
+        };
+        let labelled = streams.clone();
+        let labelled = labelled.filter(|kind| is_labelled(&kind.shape) && !is_of_table(kind));
         let of_labelled: usize = labelled.map(|kind| kind.count).sum();
         if 2 * of_labelled <= rows || 2 * rows <= order.len() {
             return None;
         }
         order.retain(is_stream);
-        // Lines that each have a time are separate samples.
-        let are_parts = streams.filter(|kind| kind.has_time()).count() < 2;
+        // Lines of which most have a time are separate samples.
+        let timed = streams.clone().filter(|kind| kind.has_time()).count();
+        let are_parts = timed < 2 || 2 * timed < streams.count();
         let kind = |place: &usize| &kinds[*place];
         let streams = cycle(&order).filter(|_| are_parts);
         let streams = streams.map(|places| vec![places.iter().map(kind).collect()]);
@@ -282,7 +324,12 @@ impl Labelled {
                 streams[k].name = format!("{}{}", streams[k].name, k + 1);
             }
         }
-        Some(Self { comma, streams })
+        between.retain(|_, count| *count >= least);
+        Some(Self {
+            comma,
+            streams,
+            between: between.into_keys().collect(),
+        })
     }
 
     /// The stream of this name or, without a name, the one with the most values.
@@ -299,12 +346,10 @@ impl Labelled {
         names.filter(|_| self.streams.len() > 1).collect()
     }
 
-    /// Whether a line has the shape of any stream.
-    pub fn knows(&self, line: &[u8]) -> bool {
-        let marked = Marked::of(line, self.comma);
-        self.streams
-            .iter()
-            .any(|stream| stream.shapes.contains(&marked.shape))
+    /// Whether this is the shape of any stream, or of a line between the lines of streams.
+    fn knows(&self, shape: &Vec<u8>) -> bool {
+        let mut streams = self.streams.iter();
+        streams.any(|stream| stream.shapes.contains(shape)) || self.between.contains(shape)
     }
 }
 
@@ -349,11 +394,12 @@ impl Kind {
     }
 }
 
-/// A sample read line by line.
+/// A sample that is read line by line.
 #[derive(Debug, Default)]
 pub struct Sample {
     values: Vec<u8>,
     lines: usize,
+    section: Section,
 }
 
 /// Contribution of a line to a sample.
@@ -363,20 +409,30 @@ pub enum Added {
     Complete,
     /// Values before others.
     Part,
-    /// No values, because the line has another shape.
+    /// The line belongs to another stream, or between the lines of streams.
+    Other,
+    /// The line has another shape and contributes no values.
     Nothing,
 }
 
 impl Sample {
-    /// Adds the values of a line; once the sample is complete, they are replaced by the values of the sample. A sample
-    /// with missing lines is left out.
+    /// Adds the values of a line; once the sample is complete, they are replaced by the values of the sample. Samples
+    /// with missing lines are left out.
     pub fn add(&mut self, labelled: &Labelled, stream: &Stream, line: &mut Vec<u8>) -> Added {
-        let marked = Marked::of(line, labelled.comma);
+        let marked = self.section.marked(line, labelled.comma);
         let is = |part: usize| stream.shapes.get(part) == Some(&marked.shape);
+        if labelled.between.contains(&marked.shape) {
+            return Added::Other;
+        }
         if !is(self.lines) {
             self.lines = 0;
             if !is(0) {
-                return Added::Nothing;
+                let is_known = labelled.knows(&marked.shape);
+                return if is_known {
+                    Added::Other
+                } else {
+                    Added::Nothing
+                };
             }
         }
         if self.lines == 0 {
@@ -400,29 +456,22 @@ impl Sample {
 
 /// Whether a number before a semicolon or tab has a comma.
 fn has_decimal_comma(line: &[u8]) -> bool {
-    let fields = line.split(|byte| matches!(byte, b';' | b'\t'));
     let is_decimal = |field: &[u8]| {
         let field = field.trim_ascii();
         field.contains(&b',')
             && number(field, true) == Some(field.len())
             && number(field, false) != Some(field.len())
     };
-    line.iter().any(|byte| matches!(byte, b';' | b'\t')) && fields.into_iter().any(is_decimal)
+    let between = |by: &'static [u8]| line.split(move |byte| by.contains(byte));
+    let mut quoted = between(b"\"").skip(1).step_by(2);
+    quoted.any(is_decimal)
+        || line.iter().any(|byte| b";\t".contains(byte)) && between(b";\t").any(is_decimal)
 }
 
 /// Whether a field has words or signs next to its number, a row has words between its numbers, or the row begins like a
 /// comment or a sentence of a receiver.
 fn is_labelled(shape: &[u8]) -> bool {
-    let is_mark = |byte: &u8| matches!(*byte, MARK | WORD);
-    let has_mark = |field: &[u8]| field.iter().any(is_mark);
-    // The separator of most numbers.
-    let parted = |by: &u8| {
-        let fields = shape.split(|byte| byte == by);
-        fields.filter(|field| has_mark(field)).count()
-    };
-    let separators = [b'|', b',', b'\t', b';'];
-    let separator = separators.into_iter().filter(|byte| shape.contains(byte));
-    let separator = separator.max_by_key(parted);
+    let separator = separator(shape);
     let is_mixed = |field: &[u8]| {
         let field = field.trim_ascii();
         let quoted = field
@@ -440,13 +489,55 @@ fn is_labelled(shape: &[u8]) -> bool {
     let names_next = pairs.any(|(k, pair)| {
         let says_so = matches!(pair[0].last(), Some(b':' | b'='));
         let is_between = first.is_some_and(|first| k > first);
-        !pair[0].is_empty() && !has_mark(pair[0]) && has_mark(pair[1]) && (says_so || is_between)
+        let is_label = says_so || is_between && separator.is_none();
+        !pair[0].is_empty() && !has_mark(pair[0]) && has_mark(pair[1]) && is_label
     });
+    // A name before the numbers and a unit behind them.
+    let mut ends = fields.iter().take(1).chain(fields.last());
+    let is_enclosed = separator.is_none() && ends.all(|end| !has_mark(end));
     comment(shape).is_some()
         || shape.starts_with(b"$")
         || separator == Some(b'|')
         || fields.iter().any(|field| is_mixed(field))
-        || separator.is_none() && names_next
+        || names_next
+        || is_enclosed
+}
+
+fn has_mark(field: &[u8]) -> bool {
+    field.iter().any(|byte| matches!(*byte, MARK | WORD))
+}
+
+/// The separator of most numbers; `None` for blanks.
+fn separator(shape: &[u8]) -> Option<u8> {
+    let parted = |by: &u8| {
+        let fields = shape.split(|byte| byte == by);
+        fields.filter(|field| has_mark(field)).count()
+    };
+    let separators = [b'|', b',', b'\t', b';'].into_iter();
+    separators
+        .filter(|byte| shape.contains(byte))
+        .max_by_key(parted)
+}
+
+/// Whether a line has a word for each field of rows of this shape, which are then those of a table.
+fn names_fields(line: &[u8], shape: &[u8]) -> bool {
+    let Some(by) = separator(shape) else {
+        return false;
+    };
+    let fields = |text: &[u8]| {
+        let end = text
+            .iter()
+            .rposition(|byte| *byte != by && !byte.is_ascii_whitespace());
+        text[..end.map_or(0, |end| end + 1)]
+            .split(|byte| *byte == by)
+            .count()
+    };
+    let is_word = |field: &[u8]| {
+        let field = field.trim_ascii();
+        !field.is_empty() && number(field, true) != Some(field.len())
+    };
+    let count = fields(line);
+    count == fields(shape) && line.split(|byte| *byte == by).take(count).all(is_word)
 }
 
 /// The kinds of lines, if all of them follow each other in turn.

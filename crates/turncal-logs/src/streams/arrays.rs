@@ -12,13 +12,13 @@ use super::{Column, Log, Stream};
 const MOST_COLUMNS: usize = 256;
 const LONGEST_ROW: usize = 1 << 16;
 
-/// The bytes of an array from an offset on.
+/// The bytes of an array, starting at an offset.
 pub type Open = Box<dyn Fn(u64) -> io::Result<Box<dyn Read>>>;
 
 /// An array of items of the same size.
 pub struct Array {
     pub shape: Vec<usize>,
-    /// Whether the first dimension varies fastest, or the last.
+    /// Whether the first or the last dimension varies fastest.
     pub first_is_fastest: bool,
     /// Bytes of an item, and the numbers in it.
     pub size: usize,
@@ -34,7 +34,7 @@ pub struct Field {
     pub name: String,
     pub kind: Kind,
     pub big_endian: bool,
-    /// Bytes of the item before the number.
+    /// Number of bytes in the item before the number.
     pub place: usize,
 }
 

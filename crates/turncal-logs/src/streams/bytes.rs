@@ -4,7 +4,7 @@ use std::io::{self, Read, Seek, SeekFrom};
 
 use crate::data_file::Content;
 
-/// Why and where reading of a file stopped.
+/// The reason for which the reading of a file stopped, and the position.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Broken {
     /// Offset from the start of the file, in bytes.
@@ -75,7 +75,7 @@ impl Input {
         if count > self.left() {
             let found = match self.left() {
                 0 => "the end of the file".to_owned(),
-                left => format!("only {left} bytes before the end of the file"),
+                left => format!("only {left} bytes left before the end of the file"),
             };
             return Err(Broken::new(
                 self.offset,

@@ -1,4 +1,4 @@
-//! Removal of a calibration already applied by an autopilot.
+//! Removal of a calibration that an autopilot has already applied.
 //!
 //! Both PX4 and ArduPilot compute `(raw − offset) ⊙ scale` for accelerometers and `raw − offset` for gyros, and then
 //! rotate the axes.
@@ -16,7 +16,7 @@ pub struct Applied {
     pub name: String,
     pub offset: [f64; 3],
     pub scale: [f64; 3],
-    /// Whether axes were then rotated (which mixes them) or further corrections were applied.
+    /// Whether the axes were then rotated, which mixes their values, or further corrections were applied.
     pub is_more: bool,
 }
 
@@ -114,7 +114,7 @@ impl Undo {
         is_news
     }
 
-    /// Removed corrections, one sentence per triad and correction.
+    /// Remarks on the removed corrections, one sentence per triad and correction.
     pub fn remarks(&self) -> Vec<String> {
         let of_triad = |&sensor: &Sensor| {
             let done = self.done.get(sensor);
@@ -134,7 +134,7 @@ fn words(program: &str, sensor: Sensor, applied: Option<&Applied>) -> String {
     match applied {
         Some(of) if of.is_more => format!(
             "{program} corrected its {triad} by {} and also rotated the axes or compensated for temperature. turncal \
-                cannot undo this, so the calibration applies to the corrected data.",
+             cannot undo these changes, so the calibration applies to the corrected data.",
             of.name
         ),
         Some(of) => format!(
@@ -142,7 +142,8 @@ fn words(program: &str, sensor: Sensor, applied: Option<&Applied>) -> String {
             of.name
         ),
         None => format!(
-            "{program} corrects its {triad}; the log does not state the correction, so its values are used unchanged."
+            "{program} corrects its {triad}; the log does not state the corrections, so turncal used the values \
+             unchanged."
         ),
     }
 }

@@ -1,4 +1,4 @@
-//! A file of streams of samples.
+//! A file that contains streams of samples.
 
 use super::bytes::Broken;
 
@@ -28,17 +28,17 @@ pub struct Stream {
     pub name: String,
     /// Columns; empty until the first sample if only that sample defines them.
     pub columns: Vec<Column>,
-    /// Remarks on its values, one sentence each.
+    /// Remarks on the values of the stream, one sentence each.
     pub remarks: Vec<String>,
     /// Whether the stream may belong to an instrument, according to the format.
     pub is_inertial: bool,
-    /// Name of its body axes, if the format has a convention.
+    /// Name of the body axes of the stream, if the format has a convention.
     pub axes: Option<&'static str>,
 }
 
 /// A file that provides streams of samples, read sequentially.
 pub trait Log {
-    /// The streams found up to here.
+    /// The streams found so far.
     fn streams(&self) -> &[Stream];
 
     /// Advances to the next sample of any stream and returns the stream; `None` at the end of the file.

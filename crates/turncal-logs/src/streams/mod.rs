@@ -58,7 +58,7 @@ const CLOSED: [(&[u8], &str, &str); 2] = [
     (
         b"PAR1",
         "a Parquet file",
-        "Save it as CSV, in Python with pandas.read_parquet(file).to_csv('imu.csv', index=False).",
+        "Save the file as CSV, in Python with pandas.read_parquet(file).to_csv('imu.csv', index=False).",
     ),
     (
         b"\xd0\xcf\x11\xe0",

@@ -1,4 +1,4 @@
-//! Parts of a file, stored or compressed, each read from its start as often as needed.
+//! Parts of a file, stored or compressed. Each part can be read from its start as often as needed.
 
 use std::cell::RefCell;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
@@ -38,7 +38,7 @@ pub enum Packing {
 pub struct Part {
     pub file: Shared,
     pub begin: u64,
-    /// Bytes in the file.
+    /// Bytes of the file, stored without compression.
     pub length: u64,
     pub packing: Packing,
 }
@@ -61,7 +61,7 @@ impl Part {
     }
 }
 
-/// Skips bytes; fewer at the end.
+/// Skips this number of bytes, or fewer at the end.
 pub fn pass(bytes: &mut dyn Read, count: u64) -> io::Result<u64> {
     io::copy(&mut bytes.take(count), &mut io::sink())
 }

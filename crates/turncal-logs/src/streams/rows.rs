@@ -9,7 +9,7 @@ use crate::data_file::DataFile;
 use crate::rows::Rows;
 use turncal_input::{FileError, Place, list, suggestion};
 
-/// A log at one sample of one of its streams.
+/// A log with the current sample of one of its streams.
 pub struct StreamRows {
     file: PathBuf,
     log: Box<dyn Log>,
@@ -32,11 +32,11 @@ pub struct StreamRows {
 pub struct Found {
     /// The stream.
     pub stream: Stream,
-    /// Number of its samples.
+    /// Number of samples in the stream.
     pub samples: u64,
 }
 
-/// All streams of a log with samples, and the error at the first damage.
+/// All streams of a log that contain samples, and the error at the first damage.
 pub fn survey(file: &Path, mut log: Box<dyn Log>) -> (Vec<Found>, Option<FileError>) {
     let mut samples: Vec<u64> = Vec::new();
     let mut row = Vec::new();
@@ -69,7 +69,7 @@ const CUT_OFF: &str = "Copy or record the file again, or set `salvage = true` to
                        before this point.";
 
 impl StreamRows {
-    /// Opens a stream with at least one sample; without a name, the only stream.
+    /// Opens a stream with at least one sample; if no name is given, opens the only stream.
     pub fn open(
         file: &DataFile,
         mut log: Box<dyn Log>,
@@ -186,7 +186,8 @@ impl Rows for StreamRows {
             ..
         } = self.damage.as_ref()?;
         Some(format!(
-            "{}, byte {offset}: found {found}, expected {expected}. turncal used the {} samples of `{}` before it.",
+            "{}, byte {offset}: found {found}, expected {expected}. turncal used the {} samples of `{}` that precede \
+             this byte.",
             self.file.display(),
             self.samples,
             self.name
@@ -249,7 +250,7 @@ fn no_stream(file: &Path, log: &dyn Log, with_samples: &[usize], name: Option<&s
     let advice = suggestion(
         name.unwrap_or_default(),
         names(),
-        "Name one of them; `turncal init FILE` shows the content of each.",
+        "Name one of these streams; `turncal init FILE` shows the content of each.",
     );
     FileError::new(file, Place::File, found, expected, advice)
 }
@@ -263,8 +264,8 @@ fn changed(file: &Path) -> FileError {
     FileError::new(
         file,
         Place::File,
-        "a file that changed while it was read",
+        "a file that was changed while turncal read it",
         "an unchanged file",
-        "Wait until it is complete, then try again.",
+        "Wait until the file is complete, then try again.",
     )
 }

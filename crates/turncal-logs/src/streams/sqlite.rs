@@ -37,7 +37,7 @@ impl Value {
     }
 }
 
-/// Values by column name.
+/// Reads values by column name.
 #[derive(Default)]
 pub struct Row {
     columns: Vec<String>,

@@ -1,4 +1,4 @@
-//! Ratios of RMS errors with their intervals: error to bound, and closed form to filter.
+//! Ratios of RMS errors with their intervals: error divided by bound, and closed form divided by filter.
 
 use crate::accuracy::tables::compared;
 use crate::prelude::*;
@@ -12,7 +12,7 @@ const FREE: f64 = 0.2;
 /// A ratio for a quantity, if the study has it.
 type OfFigures = fn(&Figures) -> Option<Ratio>;
 
-/// Error over bound, and error of the closed form over that of the filter.
+/// The error divided by the bound, and the error of the closed form divided by that of the filter.
 pub fn figures(accuracy: &Accuracy) -> [Plot; 2] {
     let bound = [(String::new(), (|f| f.ratio) as OfFigures)];
     let bound = ratios(accuracy, "RMS error / RMS bound", &bound);
@@ -27,17 +27,18 @@ pub fn figures(accuracy: &Accuracy) -> [Plot; 2] {
     );
     let gain = ratios(
         accuracy,
-        "RMS error of closed form / RMS error of EKF",
+        "RMS error of the closed form / RMS error of the EKF",
         &gains,
     );
     [
         Plot::new("ratio.svg", "Error over bound", (1, 400), [bound]).caption(
             "RMS error of the EKF divided by the Cramér–Rao bound, for each parameter group and for the position \
-             after 40 h; bars: 99 % interval. A bar that crosses the line at 1 is consistent with an optimal filter.",
+             after 40 h; the bars show 99 % intervals. If a bar crosses the line at 1, the group is consistent with \
+             an optimal filter.",
         ),
         Plot::new("gain.svg", "Gain over the closed form", (1, 460), [gain]).caption(format!(
             "RMS error of the closed form divided by the RMS error of the EKF in {filter}, with 99 % intervals. Above \
-             the line at 1 the EKF is better; below, the closed form.",
+             the line at 1, the EKF is better; below the line, the closed form is better.",
         )),
     ]
 }

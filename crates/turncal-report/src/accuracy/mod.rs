@@ -18,7 +18,7 @@ use turncal::study::{Accuracy, Figures, NavigationAccuracy};
 /// The complete report of the study.
 pub fn document(accuracy: &Accuracy) -> Document {
     let mut document = Document::new(format!(
-        "Accuracy of the filter over {} simulated runs of {}",
+        "Accuracy of the filter in {} simulated runs of {}",
         count(accuracy.trials.len()),
         accuracy.study.scenario.name
     ));
@@ -28,7 +28,9 @@ pub fn document(accuracy: &Accuracy) -> Document {
     document.both(tables::gain(accuracy));
     document.both(tables::consistency(accuracy));
     document.both(tables::auxiliary(accuracy));
-    document.both(explained(&accuracy.effects).note("This evidence is from the first run."));
+    document.both(
+        explained(&accuracy.effects).note("The evidence for the terms is from the first run."),
+    );
     document.pages(figures::figures(accuracy));
     document.data = data(accuracy);
     document
@@ -54,7 +56,10 @@ pub fn facts(accuracy: &Accuracy) -> Facts {
     let mut facts = Facts::new("The study", [("scenario", what)]);
     let runs = format!("{}, seed {}", count(accuracy.trials.len()), study.seed);
     facts.push("runs", runs);
-    let forms = format!("filter {form}, truth {truth}; compared in the general form");
+    let forms = format!(
+        "the filter uses the {form} form, and the truth has the {truth} form; both are converted to the general form \
+         for comparison"
+    );
     facts.push("misalignment", forms);
     facts.push("aiding", aiding);
     facts.push("error terms", terms(accuracy));
@@ -97,11 +102,12 @@ fn table_time(accuracy: &Accuracy) -> String {
     let baseline = &accuracy.baseline;
     let cut = match baseline.equal_time() {
         Some(time) => format!(", also cut to {}", minutes(time)),
-        None => "; its positions do not fit into the time of the EKF".to_owned(),
+        None => "; the positions of the closed form do not fit into the table time of the EKF"
+            .to_owned(),
     };
     let (filter, closed) = (minutes(accuracy.table_time), minutes(baseline.table_time));
     let path = &baseline.scenario.path_name;
-    format!("EKF {filter}; closed form {closed} on path {path}{cut}")
+    format!("EKF {filter}; closed form {closed} on the path {path}{cut}")
 }
 
 fn failures(accuracy: &Accuracy) -> String {

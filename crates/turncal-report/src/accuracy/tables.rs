@@ -1,4 +1,4 @@
-//! The tables, the same for terminal and page.
+//! The tables, which are the same on the terminal and on the page.
 
 use crate::prelude::*;
 use crate::terms::{title, unit};
@@ -52,12 +52,14 @@ pub fn bound(accuracy: &Accuracy) -> Table {
     let cells = |of: &Compared| against_bound(of.figures, of.unit_value);
     Table::new("EKF against the Cramér–Rao bound", columns(AGAINST_BOUND))
         .sections(sections(accuracy, cells))
-        .note("RMS over all runs and all parameters of a group; σ: as computed by the filter.")
-        .note("Position: horizontal, after 40 h from perfect alignment; flight: on the trajectory flight.")
-        .note("Bound: Bayesian Cramér–Rao bound from a pass linearised at the truth. Interval: bootstrap over runs.")
+        .note("RMS over all runs and all parameters of a group. RMS σ: the σ computed by the filter.")
+        .note("Position: horizontal error after 40 h of navigation from perfect alignment. Flight: the same quantity \
+        along the trajectory flight.")
+        .note("RMS bound: Bayesian Cramér–Rao bound, computed in a pass that is linearised at the truth. Interval: bootstrap over \
+               runs.")
 }
 
-/// Auxiliary parameters, term by term.
+/// Table of the auxiliary parameters, term by term.
 pub fn auxiliary(accuracy: &Accuracy) -> Table {
     let row = |(term, of): &(ErrorTerm, Figures)| {
         let (unit, in_si) = unit(*term);
@@ -124,7 +126,7 @@ pub fn consistency(accuracy: &Accuracy) -> Table {
         .section(nees.into_iter().chain(nis))
         .note("NEES/n: squared errors normalised by the stated covariance; NIS: squared innovations normalised by \
                their predicted covariance.")
-        .note("Both are 1 if the σ are correct; intervals from χ².")
+        .note("Both are 1 if the σ are correct. The intervals follow from χ².")
 }
 
 fn nis_row(name: &str, nis: &Nis) -> Vec<String> {
@@ -140,7 +142,7 @@ fn nis_row(name: &str, nis: &Nis) -> Vec<String> {
     ]
 }
 
-/// Actual and expected fraction of errors in a region.
+/// Actual and expected fraction of the errors that are within a region.
 pub fn held(of: &Containment) -> String {
     let percent = |share: f64| value(100.0 * share, 1.0);
     let found = percent(of.within as f64 / of.runs as f64);

@@ -49,7 +49,7 @@ pub fn say(document: &mut Document, accuracy: &Accuracy) {
     let runs = accuracy.trials.len();
     sentences.extend((runs < FEW).then(|| {
         warn(format!(
-            "The intervals of the ratios are approximate because {runs} runs are fewer than {FEW}."
+            "The intervals of the ratios are only approximate, because {runs} runs are fewer than {FEW}."
         ))
     }));
     for (good, text) in sentences {
@@ -66,7 +66,7 @@ fn convergence(accuracy: &Accuracy) -> (bool, String) {
     let (failed, without) = (count(failed), count(without.count()));
     let text = format!(
         "{failed} of {runs} runs failed. Every RMS excludes the runs without an estimate ({without}) and includes the \
-         others."
+         other failed runs."
     );
     (false, text)
 }
@@ -100,7 +100,7 @@ fn against_bound(accuracy: &Accuracy) -> (bool, String) {
     let (form, truth) = accuracy.forms();
     if !form.holds(truth) {
         let text = format!(
-            "The {} form cannot represent the truth, which is {}. Relative to the bound of the general form, the \
+            "The {} form cannot represent the truth, which is {}. Relative to the bound for the general form, the \
              errors are larger by these factors: {}.",
             form.name(),
             truth.name(),
@@ -110,20 +110,20 @@ fn against_bound(accuracy: &Accuracy) -> (bool, String) {
     }
     let outside = named(accuracy, of, Ordering::is_ne);
     if outside.is_empty() {
-        let text = "The ratio of RMS error to bound is 1 within its 99 % interval for every group, so the filter is \
-            consistent with the optimum.";
+        let text = "In every group, the ratio of RMS error to bound is consistent with 1 (99 % interval), so the \
+        errors of the filter are consistent with the optimum.";
         return (true, text.to_owned());
     }
     let text = format!(
-        "The ratio of RMS error to bound differs from 1 beyond its 99 % interval: {outside}. One interval in a \
-         hundred does so by chance."
+        "In these groups, the ratio of RMS error to bound differs from 1 by more than its 99 % interval: \
+         {outside}. By chance, this happens for one interval in a hundred."
     );
     (false, text)
 }
 
 fn nees(accuracy: &Accuracy) -> (bool, String) {
     let Some(of) = accuracy.anees else {
-        let text = "No run gave an estimate, so σ cannot be validated.";
+        let text = "No run gave an estimate, so the σ cannot be validated.";
         return (false, text.to_owned());
     };
     let mean = tables::mean(of.mean, of.interval_95);
@@ -131,15 +131,16 @@ fn nees(accuracy: &Accuracy) -> (bool, String) {
     let is_inside = side(of.mean, of.interval_95).0.is_eq();
     let text = match side(of.mean, of.interval_998) {
         _ if is_inside => format!(
-            "ANEES {mean} is within its 95 % interval {inner}, so the stated covariance is correct, including \
-             correlations."
+            "ANEES {mean} is within its 95 % interval {inner}, so the stated covariance, including its correlations, \
+             is correct."
         ),
         (Ordering::Equal, _) => format!(
-            "ANEES {mean} is outside its 95 % interval {inner}, as happens in one study in twenty, but within its 99.8 \
-             % interval {outer}."
+            "ANEES {mean} is within its 99.8 % interval {outer}, but outside its 95 % interval {inner}; by chance, \
+             this happens in one study in twenty."
         ),
         (_, side) => format!(
-            "ANEES {mean} is {side} its 99.8 % interval {outer}: the stated σ are too {} (errors are {} times σ).",
+            "ANEES {mean} is {side} its 99.8 % interval {outer}: the stated σ are too {} (the errors are {} times the \
+             σ).",
             if of.mean > 1.0 { "small" } else { "large" },
             tables::factor(of.mean.sqrt())
         ),
@@ -152,7 +153,7 @@ fn innovations(accuracy: &Accuracy, name: &str, nis: &Nis) -> Vec<(bool, String)
     let mut sentences = Vec::new();
     if let (Ordering::Less | Ordering::Greater, side) = side(nis.mean, nis.interval) {
         let mut text = format!(
-            "NIS of {name} ({}) is {side} its 99.8 % interval {}: the innovations are {} times as large as the \
+            "The NIS of {name} ({}) is {side} its 99.8 % interval {}: the innovations are {} times as large as the \
              filter predicts.",
             tables::mean(nis.mean, nis.interval),
             interval(nis.interval),
@@ -161,8 +162,7 @@ fn innovations(accuracy: &Accuracy, name: &str, nis: &Nis) -> Vec<(bool, String)
         let is_pulse = accuracy.study.scenario.output == Output::Pulse;
         let pulses = is_pulse && PULSES.contains(&nis.mean);
         if pulses {
-            text +=
-                " This is normal for pulses (0.9 to 1.1), because their rounding is not Gaussian.";
+            text += " For pulses, values from 0.9 to 1.1 are normal, because the rounding of pulses is not Gaussian.";
         }
         sentences.push((pulses, text));
     }
@@ -190,7 +190,7 @@ fn form(accuracy: &Accuracy) -> Option<(bool, String)> {
         count(tested)
     );
     if form.holds(truth) {
-        text += " It is the correct form; one run in a thousand rejects it by chance.";
+        text += " This form is correct; by chance, one run in a thousand rejects the correct form.";
     }
     // Three σ of a Poisson count beyond its mean by chance.
     let by_chance = 1e-3 * tested as f64;

@@ -92,14 +92,14 @@ fn axis(axis: &AxisNoise, sensor: Sensor) -> Value {
 /// A field of `[imu.noise]`: key, value, and a comment or nothing.
 type Field = (&'static str, f64, String);
 
-/// `[imu.noise]` with all detected processes, ready to paste.
+/// `[imu.noise]` with all detected processes, ready to be pasted into run.toml.
 pub fn noise_table(analysis: &NoiseAnalysis) -> String {
     let mut text = "[imu.noise]\n".to_owned();
     for &sensor in &analysis.sensors {
         let fields = of_triad(analysis, sensor);
         if fields.is_empty() {
             let name = sensor.name();
-            text += &format!("# {name}: not found; use the data-sheet value\n");
+            text += &format!("# {name}: not detected; use the value from the data sheet\n");
         }
         for (key, value, comment) in fields {
             let mark = if comment.is_empty() { "" } else { "  # " };
@@ -123,7 +123,7 @@ fn of_triad(analysis: &NoiseAnalysis, sensor: Sensor) -> Vec<Field> {
     };
     let walk = quantity(Process::RandomWalk, sensor);
     let comment = if figures.random_walk_is_limit {
-        "upper limit; its slope was not detected"
+        "upper limit, because the slope was not detected"
     } else {
         "RMS of the axes"
     };
@@ -137,10 +137,10 @@ fn of_triad(analysis: &NoiseAnalysis, sensor: Sensor) -> Vec<Field> {
         correlation_time: time_key,
         ..
     } = NoiseKeys::of(sensor);
-    let comment = "1σ of a Gauss–Markov process fitted to the deviations";
+    let comment = "1σ of a Gauss–Markov process that was fitted to the deviations";
     fields.push((key, of.sigma / unit, comment.to_owned()));
     let open = if figures.correlation_is_open {
-        "longest that the recording can show; σ grows with its square root"
+        "the longest time that the recording can show; σ grows with the square root of this time"
     } else {
         ""
     };

@@ -22,10 +22,11 @@ pub fn figure(analysis: &NoiseAnalysis, sensor: Sensor) -> Plot {
     let stated = analysis.stated.get(sensor).as_ref();
     let panels = panels.map(|(axis, letter)| panel(axis, letter, (sensor, stated), ends));
     Plot::new(&file, &heading, (3, 440), panels).caption(
-        "Overlapping Allan deviation against cluster time, both logarithmic, the same axes for all three. Dots with \
-         band: measured values with their 95 % interval; black: sum of the detected processes; dashed: each detected \
-         process, with its coefficient; random walk N is read at 1 s. Orange: the noise stated for the instrument. \
-         Ring: lowest deviation.",
+        "Overlapping Allan deviation against cluster time, both on logarithmic scales that are the same for all three \
+         axes. Dots with band: measured values with their 95 % interval; black: sum of the detected processes; \
+         dashed: each detected process, with its coefficient; the random walk coefficient N is the value of its line \
+         at 1 s. \
+         Orange: noise stated for the instrument. Ring: lowest deviation.",
     )
 }
 

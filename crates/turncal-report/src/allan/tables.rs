@@ -58,7 +58,8 @@ pub fn coefficients(analysis: &NoiseAnalysis, sensor: Sensor) -> Table {
         .chain(axes)
         .chain(["triad".to_owned()]);
     let table = Table::new(capital(triad_name(sensor)), headings).section(rows).note(
-        "± 1σ. <: slope not detected, 95 % upper limit. triad: from the mean of the three variances.",
+        "± 1σ. <: 95 % upper limit, because the slope was not detected. Triad: results from the mean of the variances \
+         of the three axes.",
     );
     match of_a_pulse(*analysis.pulse.get(sensor), sensor) {
         Some(note) => table.note(note),
@@ -71,7 +72,7 @@ fn of_a_pulse(pulse: f64, sensor: Sensor) -> Option<String> {
     let of = quantity(Process::Quantisation, sensor);
     (pulse > 0.0).then(|| {
         format!(
-            "One pulse corresponds to Q = {} {} if the noise exceeds a pulse.",
+            "One pulse corresponds to Q = {} {} if the noise exceeds one pulse.",
             three_digits(pulse / 12f64.sqrt() / of.value),
             of.unit
         )

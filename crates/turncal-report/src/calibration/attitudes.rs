@@ -1,4 +1,4 @@
-//! Attitudes reached, and those missing, as a map of the sphere.
+//! Map of the sphere with the attitudes that were reached and those that are missing.
 
 use std::f64::consts::TAU;
 
@@ -45,9 +45,9 @@ impl Report<'_> {
         let missing = named.unwrap_or_else(|| "none".to_owned());
         let far = FAR / DEGREE;
         let caption = format!(
-            "Dots: upward direction along the body axes in each dwell, in an equal-area map of the two hemispheres. \
-             Inner circle: {far:.0}° from the pole. Rings: positions with an axis up or down that are more than \
-             {far:.0}° from every dwell. Missing positions (of the six): {missing}."
+            "Dots: upward direction along the body axes in each dwell, on an equal-area map of the two hemispheres. \
+             Inner circle: {far:.0}° from the pole. Rings: positions with one axis up or down that are more than \
+             {far:.0}° from the upward direction of every dwell. Missing positions (of six): {missing}."
         );
         let plot = Plot::new("attitudes.svg", "Attitudes reached", (3, 420), panels);
         (!rests.is_empty()).then(|| plot.caption(caption))

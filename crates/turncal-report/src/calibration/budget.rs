@@ -45,13 +45,13 @@ pub fn table(budget: &Budget, estimate: &Estimate) -> Table {
             coverage,
         ])
         .note(
-            "Standard uncertainty contributed by each source, RMS over the parameters of a group; squares add up to \
-             the variance of the estimate (JCGM 100). Sources below a thousandth of every variance are not shown; \
-             calibration.json lists all of them per parameter.",
+            "Standard uncertainty contributed by each source, RMS over the parameters of a group; the sum of the \
+             squares is the variance of the estimate (JCGM 100). Sources that contribute less than a thousandth of \
+             every variance are not shown; calibration.json lists all sources for each parameter.",
         )
         .note(
-            "ν: degrees of freedom of each source, infinite if stated. k: from Student's t with the effective degrees \
-             of freedom; the largest in the group.",
+            "ν: degrees of freedom of each source, infinite if its variance is stated. k: coverage factor from \
+             Student's t with the effective degrees of freedom, largest value in the group.",
         );
     table.notes.extend(taken_as_exact(budget));
     table
@@ -149,7 +149,8 @@ pub fn figure(budget: &Budget, estimate: &Estimate) -> Plot {
         Sensor::ALL.map(panel),
     )
     .caption(
-        "Share of each source in the variance of every parameter. Improve the largest source first: noise with more \
-         time at rest, table position with more positions, the prior with a path that excites the parameter.",
+        "Share of each source in the variance of every parameter. Improve the largest source first: reduce noise with \
+         more time at rest, table position errors with more positions, and the prior with a path that excites the \
+         parameter.",
     )
 }

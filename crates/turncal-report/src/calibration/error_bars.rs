@@ -10,7 +10,7 @@ const HALF: f64 = 0.35;
 const SIGMAS: f64 = 2.0;
 
 impl Report<'_> {
-    /// Every value with ±2σ, in front of its prior and within its limits.
+    /// Every value with an error bar of ±2σ, drawn over its prior and between its limits.
     pub fn error_bars(&self, estimate: &Estimate) -> Plot {
         let prior = self.outcome.map(|outcome| {
             let mean = self.run.instrument.prior_mean(estimate.form());
@@ -18,11 +18,12 @@ impl Report<'_> {
         });
         let panels =
             Group::all().filter_map(|group| self.of_group(group, estimate, prior.as_ref()));
-        let mut caption = "Each parameter with an error bar of ±2σ (hidden by the dot if the parameter is well \
-                           determined); scale factors as deviation from nominal. Bands: prior mean ±1σ."
-            .to_owned();
+        let mut caption =
+            "Each parameter with an error bar of ±2σ (hidden by the dot if the parameter is well \
+        determined); scale factors are shown as deviations from nominal. Bands: prior mean ±1σ."
+                .to_owned();
         if self.specification.is_some() {
-            caption += " Dashed: limits of the specification; a prior may extend beyond the axes.";
+            caption += " Dashed: limits of the specification. The error bar of a prior may extend beyond the axes.";
         }
         let heading = "Values with their uncertainty";
         Plot::new("values.svg", heading, (3, 270), panels).caption(caption)

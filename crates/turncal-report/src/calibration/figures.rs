@@ -16,7 +16,7 @@ const WRITTEN: f64 = 0.2;
 const FAINT: f64 = 0.02;
 
 impl Report<'_> {
-    /// All figures with data.
+    /// All figures for which there are data.
     pub fn figures(&self) -> Vec<Plot> {
         let mut plots = Vec::new();
         if let Some(outcome) = self.against_time() {
@@ -29,7 +29,7 @@ impl Report<'_> {
         plots
     }
 
-    /// The filter result if it has a single time axis; several recordings do not have one.
+    /// The filter result, if it has a single time axis; the result of several recordings has no single time axis.
     pub fn against_time(&self) -> Option<&Outcome> {
         self.outcome.filter(|outcome| outcome.alone.len() < 2)
     }
@@ -64,11 +64,13 @@ impl Report<'_> {
             (!indices.is_empty()).then_some(panel)
         };
         let mut caption =
-            "1σ of every parameter during the last pass, one panel per group, logarithmic. Grey: dwells; white: \
-             turns. A flat line means the parameter was not observed."
+            "1σ of every parameter during the last pass, with one panel per group, on a logarithmic \
+             scale. Grey: dwells; white: \
+             turns. A flat line means that the parameter was not observed."
                 .to_owned();
         if truth.is_some() {
-            caption += " Dashed: the largest true error in the group; it should end within a few σ of the lines.";
+            caption += " Dashed: largest true error in the group; at the end, this error should be within a few σ of \
+            the lines.";
         }
         let (heading, panels) = ("Accuracy against time", Group::all().filter_map(panel));
         let plot = Plot::new("sigma.svg", heading, (3, 330), panels);
@@ -108,8 +110,9 @@ impl Report<'_> {
         let panels: Vec<Panel> = panels.collect();
         let caption = format!(
             "Innovations of the last pass divided by their σ; they should look like white noise of unit variance. \
-             Solid lines: ±1σ; dashed: ±3σ. Dense data are drawn as the extremes of each interval. \
-             Points at the edge: ±{EDGE}σ or more."
+             Solid lines: ±1σ; dashed: ±3σ. Where data points are dense, only the extremes of each interval are \
+             drawn. Points \
+             at the edge: ±{EDGE}σ or more."
         );
         let drawn = !panels.is_empty();
         let plot = Plot::new("innovations.svg", "Innovations", (3, 270), panels);
@@ -163,10 +166,10 @@ fn correlation(estimate: &Estimate) -> Option<Plot> {
     let mut panel = Panel::new("", Axis::places(names()), y).with_all(series);
     panel.square = true;
     let plot = Plot::new("correlation.svg", "Correlations", (1, 860), [panel]).caption(format!(
-        "Correlation of the estimated parameters. Below the diagonal the side of a square grows with the magnitude; \
-         blue squares are positive, orange ones negative. If the figure is wide enough, the coefficient is given in \
-         hundredths above the diagonal where its magnitude is at least {WRITTEN}. This path determines strongly \
-         correlated parameters only as a sum or difference, not individually."
+        "Correlation of the estimated parameters. Below the diagonal, the side of each square grows with the \
+         magnitude of the correlation; blue squares are positive, orange squares negative. If the figure is wide \
+         enough, the coefficients with a magnitude of at least {WRITTEN} are given in hundredths above the \
+         diagonal. If two parameters are strongly correlated, this path determines only their sum or difference."
     ));
     (!indices.is_empty()).then_some(plot)
 }

@@ -19,7 +19,7 @@ mod tests;
 use std::collections::BTreeSet;
 
 use crate::prelude::*;
-use crate::{navigation, terms, values};
+use crate::{ieee, navigation, terms, values};
 use turncal::calibration::{Finding, FindingKind};
 use turncal::imu::{Noise, Sensor};
 
@@ -27,8 +27,8 @@ pub use report::{ClosedForm, Report};
 pub use solved::{Truth, document, dwell_times, note, within};
 pub use tables::cross_validation;
 
-/// Order of findings: the most severe first; within a level, the first of each kind, then further ones of a kind, then
-/// the assumptions of the reader.
+/// Sorts the findings, the most severe first. Within a level, the first finding of each kind precedes further findings
+/// of the same kind, and the assumptions made on reading come last.
 pub fn in_order(findings: &[Finding]) -> Vec<Finding> {
     let mut seen = BTreeSet::new();
     let keyed = findings.iter().map(|finding| {
@@ -41,7 +41,7 @@ pub fn in_order(findings: &[Finding]) -> Vec<Finding> {
 }
 
 impl Report<'_> {
-    /// The complete report on the calibration. Its named values are in the calibration file.
+    /// The complete report on the calibration. The named values of the report are in the calibration file.
     pub fn document(&self) -> Document {
         let mut document = Document::new(self.title);
         document.verdict = values::verdict(self.calibration);
@@ -60,6 +60,7 @@ impl Report<'_> {
         if let Some(estimate) = self.estimate() {
             document.both(self.parameters(estimate));
         }
+        document.both(ieee::table(self.calibration));
         document.fold("Residuals, consistency, error terms");
         if let Some(quality) = self.quality {
             document.both(tables::residuals(quality, self.table()));
@@ -184,7 +185,8 @@ pub fn run(report: &Report) -> Facts {
     }
     if let Some(table) = report.table() {
         let readings = format!(
-            "{} readings; position {} ″ (1σ, independent at each position), reading {} ″ (1σ, white)",
+            "{} readings; position error {} ″ (1σ, independent from position to position), reading error {} ″ (1σ, \
+             white)",
             count(table.time.len()),
             sigma(run.table.position_sigma / ARCSEC),
             sigma(run.table.reading_sigma / ARCSEC)
@@ -213,8 +215,8 @@ fn noise(sensor: Sensor, noise: &Noise) -> String {
 impl Report<'_> {
     /// The model, the method and the frame.
     pub fn model(&self) -> Facts {
-        let symbols = "N: output per second divided by its nominal scale; u: angular rate or specific force along \
-            the body axes; K: scale factors, shown as deviation from nominal; E: off-diagonal entries of C; D: bias";
+        let symbols = "N: output per second divided by its nominal scale; u: angular rate or specific force along the \
+        body axes; K: scale factors, shown as deviations from nominal; E: off-diagonal entries of C; D: bias";
         let equation = "N = K C u + D; u = (K C)⁻¹ (N − D)";
         let rows = [("equation", equation), ("symbols", symbols)];
         let mut facts = Facts::new("Model and method", rows);

@@ -7,7 +7,7 @@ use turncal::imu::{AXES, Noise, Sensor};
 use turncal::noise::curves_at_rest;
 
 impl Report<'_> {
-    /// The Allan deviation over the dwells, a panel for each triad; `None` if they are too short.
+    /// The Allan deviation over the dwells, with a panel for each triad; `None` if the dwells are too short.
     pub fn noise(&self) -> Option<Plot> {
         let (run, outcome) = (self.run, self.outcome?);
         let dwells = run.dwells(self.aiding).into_iter();
@@ -48,9 +48,9 @@ impl Report<'_> {
         );
         (curves.gyro[0].tau.len() > 2).then(|| {
             plot.caption(
-                "Overlapping Allan deviation of each axis against cluster time, averaged over the dwells. Black: noise \
-                 that the calibration estimated. Dashed: noise stated for the instrument. Dots far above a line \
-                 indicate vibration or quantisation at short times, and a varying bias at long times.",
+                "Overlapping Allan deviation of each axis against cluster time, averaged over the dwells. Black: \
+                 noise that the calibration estimated. Dashed: noise stated for the instrument. Dots far above the \
+                 lines indicate vibration or quantisation at short times, and a varying bias at long times.",
             )
         })
     }

@@ -1,4 +1,4 @@
-//! Properties of single figures of a calibration.
+//! Tests of single figures of a calibration.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -36,7 +36,10 @@ fn the_figure_of_the_readme_is_that_of_the_demo() {
         fs::write(&path, &drawn).unwrap();
     }
     let shown = fs::read_to_string(&path).unwrap();
-    assert!(shown == drawn, "INSTA_UPDATE=always draws it again");
+    assert!(
+        shown == drawn,
+        "the figure has changed; set INSTA_UPDATE=always to draw it again"
+    );
 }
 
 #[test]

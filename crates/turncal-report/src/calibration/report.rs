@@ -54,9 +54,9 @@ pub struct Report<'a> {
 /// The closed-form result, the baseline of the comparison.
 #[derive(Debug, Clone, Copy)]
 pub struct ClosedForm<'a> {
-    /// Its estimate with the stated σ.
+    /// The estimate of the closed form with its stated σ.
     pub estimate: &'a Estimate,
-    /// Its data, such as `six positions, 60 min of its own`.
+    /// The data that the closed form used, such as `six positions, 60 min of its own`.
     pub note: &'a str,
 }
 

@@ -1,11 +1,11 @@
-//! Residuals before and after calibration, as a figure.
+//! Figure of the residuals before and after calibration.
 
 use super::tables::{ANGLE, FORCE};
 use crate::prelude::*;
 use turncal::calibration::{DwellResidual, Quality};
 
-/// Magnitude of the gravity residuals in each dwell and after each move, for the nominal and the calibrated instrument;
-/// rings mark dwells excluded from a fit.
+/// Magnitude of the gravity residuals in each dwell and after each move, for the nominal and for the calibrated
+/// instrument; rings mark dwells excluded from a fit.
 pub fn figure(quality: &Quality) -> Plot {
     let panel = |name: &str, place: &str, units, of: fn(&DwellResidual) -> Option<f64>| {
         let points = |dwells: &[DwellResidual]| -> Vec<Point> {
@@ -47,9 +47,9 @@ pub fn figure(quality: &Quality) -> Plot {
         panels,
     )
     .caption(
-        "|f| − gravity: deviation of the mean specific force of each dwell from gravity. Direction: angle, after each \
-         move, between the vertical carried over from the previous dwell by the gyros and the vertical measured by the \
-         accelerometers. Crosses: the nominal instrument, without calibration. Dots: the calibrated instrument. Rings: \
-         an instrument calibrated without that dwell.",
+        "|f| − gravity: deviation of the mean specific force of each dwell from gravity. Direction: after each move, \
+         the angle between the vertical that the gyros carried over from the previous dwell and the vertical that the \
+         accelerometers measured. Crosses: the instrument with nominal parameters, before calibration. Dots: the \
+         calibrated instrument. Rings: the instrument calibrated without the data of this dwell.",
     )
 }

@@ -11,7 +11,7 @@ use turncal::imu::{PerSensor, Triad};
 use turncal::lot::Specification;
 use turncal::study::{CheckedCalibration, Consequences};
 
-/// A true calibration, in the general form, with its error terms.
+/// The true calibration in the general form, with its error terms.
 pub struct Truth {
     /// Both triads.
     pub triads: PerSensor<Triad>,
@@ -19,7 +19,7 @@ pub struct Truth {
     pub terms: BTreeMap<String, TermRecord>,
 }
 
-/// The report on a problem of this name, on its calibration and the consequences of the calibration.
+/// The report on the calibration of a problem with this name, and on its effect on navigation.
 pub fn document(
     (problem, name): (&Problem, &str),
     (checked, consequences): (&CheckedCalibration, &Consequences),
@@ -69,7 +69,7 @@ pub fn within(
     report.document()
 }
 
-/// Short description of the data used by a closed form.
+/// Short description of the data that a closed form used.
 pub fn note(closed_form: &ClosedForm) -> String {
     let PerSensor { gyro, accel } = closed_form.positions;
     let turns = closed_form.turns;
@@ -79,7 +79,7 @@ pub fn note(closed_form: &ClosedForm) -> String {
         }
         Reference::Labels => format!("{accel} labelled positions and {turns} labelled turns"),
         Reference::Gravity => {
-            format!("gravity in {accel} dwells and its direction change over {turns} turns")
+            format!("gravity in {accel} dwells and the change of its direction over {turns} turns")
         }
         Reference::GravityAlone => format!("the magnitude of gravity in {accel} dwells"),
     };

@@ -1,4 +1,4 @@
-//! The tables, the same for terminal and page.
+//! The tables, which are the same on the terminal and on the page.
 
 use super::super::terms;
 use super::super::terms::improvement;
@@ -58,7 +58,7 @@ impl Report<'_> {
     }
 }
 
-/// The least observed directions: all unobserved ones and some observed ones.
+/// The least observed directions: all directions that are not observed, and some that are observed.
 pub fn weakest(outcome: &Outcome) -> Table {
     let observability = &outcome.observability;
     let shown = observability.unobserved().count() + WEAKEST;
@@ -66,8 +66,9 @@ pub fn weakest(outcome: &Outcome) -> Table {
     Table::new("Least observed directions", ["direction", "prior : σ"])
         .section(rows.map(|of| vec![of.words.clone(), improvement(1.0, of.remaining)]))
         .note(
-            "Combinations of parameters, each in units of its prior σ, that the data determine independently of each \
-             other. “With” joins errors of the same sign, “against” errors of opposite sign.",
+            "Combinations of parameters, each in units of its prior σ, that the data determine \
+             independently. “With” joins parameters whose errors have the same sign; “against” joins parameters whose \
+             errors have opposite signs.",
         )
 }
 
@@ -76,7 +77,7 @@ fn observed(outcome: &Outcome) -> impl Iterator<Item = (&'static str, Nis)> {
     kinds.map(|(observation, nis)| (observation.name(), nis))
 }
 
-/// NIS of each kind of observation with its interval.
+/// NIS of each kind of observation, with its 95 % interval.
 pub fn nis(outcome: &Outcome) -> Vec<String> {
     let shown = |(name, nis): (&str, Nis)| {
         let (low, high) = nis.interval;
@@ -86,7 +87,7 @@ pub fn nis(outcome: &Outcome) -> Vec<String> {
     observed(outcome).map(shown).collect()
 }
 
-/// Consistency of the innovations with their covariance.
+/// Table of the consistency of the innovations with their covariance.
 pub fn consistency(outcome: &Outcome) -> Table {
     let rows = observed(outcome).map(|(name, nis)| {
         let (low, high) = nis.interval;
@@ -104,12 +105,12 @@ pub fn consistency(outcome: &Outcome) -> Table {
         ]
     });
     Table::new("Consistency", columns("observation | NIS per scalar | 95 % interval | lag-one correlation | scalars")).section(rows).note(
-        "If NIS is within its interval and the correlation is near zero, the innovations are as large and as white \
-         as the filter predicts.",
+        "If the NIS is within its interval and the lag-one correlation is near zero, the innovations are as large and \
+         as white as the filter predicts.",
     )
 }
 
-/// Residuals in dwells excluded from the fit, on one line.
+/// One line with the residuals in dwells excluded from the fit.
 pub fn cross_validation(quality: &Quality) -> Option<String> {
     let held_out = quality.held_out.as_ref()?;
     let of = |name: &str, spread: &Spread, units: &[(&'static str, f64); 2]| {
@@ -125,7 +126,7 @@ pub fn cross_validation(quality: &Quality) -> Option<String> {
     (!parts.is_empty()).then(|| format!("{} ({} dwells)", parts.join("; "), held_out.gravity.count))
 }
 
-/// Each residual over the whole recording and over the excluded dwells; empty without data.
+/// Each residual, over the whole recording and over the excluded dwells; empty if there are no data.
 pub fn residuals(quality: &Quality, table: Option<&TableLog>) -> Table {
     let turns = match table {
         Some(_) => "attitude after a turn, gyros minus table",
@@ -133,7 +134,7 @@ pub fn residuals(quality: &Quality, table: Option<&TableLog>) -> Table {
     };
     let named = [
         ("|f| minus g in dwells", FORCE),
-        ("up after a turn, gyros minus accels", ANGLE),
+        ("vertical after a turn, gyros minus accels", ANGLE),
         (turns, ANGLE),
     ];
     let of = |m: &Measures| [m.gravity, m.direction, m.turns];
@@ -161,7 +162,8 @@ pub fn residuals(quality: &Quality, table: Option<&TableLog>) -> Table {
     let table = Table::new("Residuals at rest and after turns", columns).section(rows);
     if quality.held_out.is_some() {
         table.note(
-            "Cross-validation: residuals in dwells excluded from the fit, and over the turns that end in them.",
+            "Cross-validation: residuals in dwells excluded from the fit, and over the turns that end in these \
+             dwells.",
         )
     } else {
         table

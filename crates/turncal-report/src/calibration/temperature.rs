@@ -9,7 +9,7 @@ use turncal::imu::{InstallationForm, RATE, Sensor};
 /// Number of points of a curve.
 const POINTS: usize = 81;
 
-/// Change of parameters with temperature, if they depend on it.
+/// Change of the parameters with temperature, if they depend on temperature.
 pub fn figure(outcome: &Outcome) -> Option<Plot> {
     let thermal = outcome.thermal.as_ref()?;
     let reference = outcome.estimate.vector();
@@ -26,7 +26,7 @@ pub fn figure(outcome: &Outcome) -> Option<Plot> {
     Some(curves(&outcome.estimate, thermal, marks, alone))
 }
 
-/// Adds tables and figures, if anything changes or differs.
+/// Adds tables and figures, if parameters change with temperature or differ between recordings.
 pub fn add(document: &mut Document, outcome: &Outcome) {
     if let Some(thermal) = &outcome.thermal {
         let form = outcome.estimate.form();
@@ -76,8 +76,9 @@ pub fn orders(form: InstallationForm, thermal: &Thermal) -> Table {
             rows.filter_map(|i| row(group, i)).collect::<Vec<_>>()
         }))
         .note(format!(
-            "Legendre coefficients ± 1σ over {ranges}: change of the parameter over half the range. Each order is \
-             averaged over its absence and its usual sizes."
+            "Legendre coefficients ± 1σ over {ranges}: each coefficient is the change of the parameter over half the \
+             temperature range. Each order is averaged over the case that it is absent and the cases that it has one \
+             of its usual sizes."
         ))
 }
 
@@ -104,8 +105,8 @@ pub fn hysteresis(form: InstallationForm, thermal: &Thermal) -> Table {
     .section(rows)
 }
 
-/// Every parameter against temperature, with marks of this meaning: temperature and change of the parameter from the
-/// reference.
+/// Figure of every parameter against temperature. Each mark is at a temperature and shows the change of the parameter
+/// from its value at the reference temperature; `meaning` describes the marks.
 pub fn curves(
     estimate: &Estimate,
     thermal: &Thermal,
@@ -140,7 +141,7 @@ pub fn curves(
     let heading = "Parameters against temperature";
     let panels = Group::all().filter_map(panel);
     Plot::new("temperature.svg", heading, (3, 330), panels).caption(format!(
-        "Change of each parameter from its value at the reference temperature, with its ±1σ band. Rings: {meaning}."
+        "Change of each parameter from its value at the reference temperature, with a band of ±1σ. Rings: {meaning}."
     ))
 }
 
@@ -166,7 +167,7 @@ fn recordings(outcome: &Outcome) -> Table {
     .section(outcome.alone.iter().enumerate().map(row))
     .note(
         "χ²/n: squared difference between the estimate from one recording and the joint estimate, per parameter, \
-         normalised by their covariance and the stated [day_to_day] differences.",
+         normalised by the covariance of the estimates and by the stated [day_to_day] differences.",
     )
 }
 
@@ -192,8 +193,8 @@ fn differences(outcome: &Outcome) -> Table {
     )
     .section(rows)
     .note(
-        "Spread: standard deviation of the single-recording estimates about the common curve; by σ alone: value \
-         expected from their σ. If χ²/n exceeds its limit, the instrument does not repeat; state the difference in \
-         [day_to_day].",
+        "Spread: standard deviation of the estimates from single recordings about the common curve; by σ alone: the \
+         spread expected from the σ of these estimates. If χ²/n exceeds its limit, the values differ between \
+         recordings by more than stated; state the difference in [day_to_day].",
     )
 }

@@ -20,20 +20,20 @@ pub struct AsFound {
 /// Change of a parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Change {
-    /// Earlier value, with the uncertainty of the earlier calibration (zero if not stated).
+    /// Value in the earlier calibration, with its uncertainty (zero if not stated).
     pub found: Measured,
     /// Value now.
     pub left: Measured,
 }
 
 impl Change {
-    /// The value now minus the earlier one.
+    /// The present value minus the earlier value.
     pub fn difference(&self) -> f64 {
         self.left.value - self.found.value
     }
 
-    /// Expanded uncertainty of the difference, as if both calibrations were from independent data; `None` if the
-    /// earlier calibration states none.
+    /// Expanded uncertainty of the difference, assuming that both calibrations are from independent data; `None` if the
+    /// earlier calibration states no uncertainty.
     pub fn expanded(&self) -> Option<f64> {
         let (found, left) = (self.found.expanded, self.left.expanded);
         (found > 0.0).then(|| found.hypot(left))

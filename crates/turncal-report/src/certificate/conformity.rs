@@ -15,9 +15,9 @@ use turncal::lot::{Limit, Specification, probability_outside};
 pub enum Decision {
     /// Within the limit.
     Pass,
-    /// The value is inside the limit by less than its uncertainty.
+    /// The value is inside the limit, but by less than its uncertainty.
     ConditionalPass,
-    /// The value is outside the limit by less than its uncertainty.
+    /// The value is outside the limit, but by less than its uncertainty.
     ConditionalFail,
     /// Outside the limit.
     Fail,
@@ -48,11 +48,11 @@ impl Decision {
 /// Decision on a parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Decided {
-    /// Its name in the general form.
+    /// Name of the parameter in the general form.
     pub name: String,
     /// The limit.
     pub limit: Limit,
-    /// Distance from the centre of the limit, in SI.
+    /// Distance of the value from the centre between the limits, in SI units.
     pub off: f64,
     /// 1σ of this distance.
     pub sigma: f64,
@@ -82,8 +82,8 @@ impl Conformity {
     }
 }
 
-/// Decision on a parameter at this distance from the centre of a limit, and the probability that it is wrong. A guard
-/// band is the expanded uncertainty, k σ.
+/// Decision on a parameter at this distance from the centre between its limits, and the probability that the decision
+/// is wrong. The guard band is the expanded uncertainty, k σ.
 pub fn decide(
     off: f64,
     (sigma, k): (f64, f64),

@@ -1,7 +1,7 @@
 //! The certificate as a Digital Calibration Certificate: PTB's DCC 3.3.0 with D-SI 2.2.1 quantities.
 //!
-//! Values are in SI: scale factors relative to nominal, angles in rad, biases in rad/s and m/s², each as a separate
-//! quantity with its expanded uncertainty, followed by the covariance of all.
+//! Values are in SI units: scale factors relative to nominal, angles in rad, biases in rad/s and m/s², each as a
+//! separate quantity with its expanded uncertainty, followed by the covariance of all.
 
 use maud::{Markup, html};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -195,7 +195,7 @@ fn administrative(certificate: &Certificate) -> Markup {
 
 fn statement(limit: &Decided, rule: &str) -> Markup {
     let text = format!(
-        "{} from nominal in SI units, limit ±{}; decision rule: {rule}; probability that the decision is wrong: {:.1e}",
+        "{} from nominal in SI units, limit ±{}; decision rule: {rule}; probability of a wrong decision: {:.1e}",
         number(limit.off),
         number(limit.limit.within),
         limit.risk,
@@ -294,7 +294,7 @@ fn description(certificate: &Certificate) -> String {
 /// Parameters as found, with their own uncertainties; parameters as left are the results in the same body frame.
 fn found(as_found: &AsFound) -> Markup {
     let about = format!(
-        "Valid when the item was received, from {}; general installation form, body frame: {}.",
+        "Valid when the item was received; from {}; general installation form, body frame: {}.",
         as_found.earlier,
         as_found.body_frame.words()
     );

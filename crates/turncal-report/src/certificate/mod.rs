@@ -1,5 +1,5 @@
-//! A calibration certificate according to ISO/IEC 17025:2017, 7.8.2 and 7.8.4, from a calibration and the
-//! statements of the laboratory. It claims no accreditation.
+//! A calibration certificate according to ISO/IEC 17025:2017, 7.8.2 and 7.8.4, from a calibration and the statements of
+//! the laboratory. The certificate claims no accreditation.
 
 mod as_found;
 mod conformity;
@@ -70,7 +70,7 @@ pub struct Certificate {
     pub results: Vec<Measured>,
     /// Every parameter of the instrument's error terms with its expanded uncertainty.
     pub terms: Vec<Measured>,
-    /// Covariance of the estimated parameters, in the order of the results, in SI.
+    /// Covariance of the estimated parameters in SI units, in the order of the results.
     pub covariance: Vec<Vec<f64>>,
     /// Conformity with limits, if any are given.
     pub conformity: Option<Conformity>,
@@ -79,10 +79,10 @@ pub struct Certificate {
 }
 
 impl Certificate {
-    /// The certificate of a calibration; the SHA-256 is that of its file.
+    /// The certificate of a calibration; the SHA-256 is that of the calibration file.
     ///
     /// # Errors
-    /// [`CertificateError`] if the calibration must not be used, or a field is missing.
+    /// Returns [`CertificateError`] if the calibration must not be used, or a field is missing.
     pub fn new(
         calibration: Calibration,
         sha256: String,
@@ -138,7 +138,8 @@ impl Certificate {
     /// Remarks for the customer: scope of the certificate, remarks of the laboratory, and findings of the evaluation.
     pub fn remarks(&self) -> Vec<String> {
         let general = [
-            "The results relate only to the item named above, in the state and under the conditions stated.",
+            "The results relate only to the item named above, in the stated condition of the item and under the \
+             stated measurement conditions.",
             "This certificate may not be reproduced except in full without approval of the laboratory.",
         ];
         let general = general.into_iter().map(str::to_owned);

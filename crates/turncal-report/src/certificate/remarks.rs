@@ -1,10 +1,11 @@
-//! Findings in sentences for the customer: a fact about the results, without advice to the laboratory.
+//! Findings in sentences for the customer. Each sentence states a fact about the results, without advice to the
+//! laboratory.
 
 use super::in_words;
 use turncal::calibration::Finding;
 use turncal::calibration::FindingKind as Kind;
 
-/// A sentence per kind of finding; a kind unknown to this version is given by its code.
+/// One sentence per kind of finding; a kind that this version does not know is given by its code.
 pub fn sentences(findings: &[Finding]) -> Vec<String> {
     let mut all: Vec<String> = Vec::new();
     for finding in findings {

@@ -8,8 +8,8 @@ use turncal::imu::{Nominal, ParameterKind, PerSensor, Sensor, TERM_PARAMETERS, T
 /// Coverage factor for 95.45 % if the degrees of freedom were not evaluated.
 const COVERAGE_FACTOR: f64 = 2.0;
 
-/// Coverage factor and degrees of freedom of a parameter, the same in every table: from the budget of the calibration,
-/// otherwise for a normal distribution.
+/// Coverage factor and degrees of freedom of a parameter, which are the same in every table. Coverage factor and
+/// degrees of freedom come from the budget of the calibration or, without a budget, from a normal distribution.
 pub fn coverage(calibration: &Calibration, name: &str) -> (f64, Option<f64>) {
     let place = calibration.parameters.iter().position(|of| of == name);
     let of_budget = calibration
@@ -35,7 +35,7 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    /// Symbol of its display unit, and the value of this unit in SI.
+    /// Symbol of the displayed unit, and the value of this unit in SI units.
     pub fn unit(self) -> (&'static str, f64) {
         match self {
             Self::Term(term) => term.entry().unit,
@@ -43,7 +43,7 @@ impl Quantity {
         }
     }
 
-    /// Its SI unit in D-SI notation.
+    /// The SI unit of the parameter in D-SI notation.
     pub fn si_unit(self) -> &'static str {
         match self {
             Self::Term(term) => term.entry().d_si_unit,
@@ -60,12 +60,12 @@ impl Quantity {
 /// A parameter with its expanded uncertainty.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measured {
-    /// Its name, such as `gyro.scale.x`.
+    /// Name of the parameter, such as `gyro.scale.x`.
     pub name: String,
     /// Its quantity.
     pub quantity: Quantity,
-    /// Value in SI: scale factors over their nominal value minus one, angles in rad, biases in rad/s or m/s²;
-    /// parameters of error terms as in the calibration's file.
+    /// Value in SI units: scale factors divided by their nominal value, minus one; angles in rad; biases in rad/s or
+    /// m/s²; parameters of error terms as in the calibration file.
     pub value: f64,
     /// Expanded uncertainty.
     pub expanded: f64,
@@ -80,7 +80,7 @@ pub fn nominal(provenance: &Provenance) -> PerSensor<Nominal> {
     PerSensor::from_fn(|sensor| Nominal((*provenance.nominal.get(sensor)).into()))
 }
 
-/// Every estimated parameter, and their covariance in SI; `None` if the record has no covariance.
+/// All estimated parameters and their covariance in SI units; `None` if the record has no covariance.
 pub fn results(
     calibration: &Calibration,
     provenance: &Provenance,
@@ -133,7 +133,8 @@ pub fn results(
     Some((results.collect::<Option<_>>()?, covariance))
 }
 
-/// Every estimated parameter of the instrument's error terms; those of the table are not results for the instrument.
+/// Every estimated parameter of the instrument's error terms; the errors of the table are not included, because they
+/// are not results for the instrument.
 pub fn terms(calibration: &Calibration) -> Vec<Measured> {
     let measured = |k: usize| {
         let name = Term::parameter_name(k)?;
@@ -151,7 +152,7 @@ pub fn terms(calibration: &Calibration) -> Vec<Measured> {
     (0..TERM_PARAMETERS).filter_map(measured).collect()
 }
 
-/// States the temperatures at which the results are valid, and the location of their temperature coefficients.
+/// States the temperatures at which the results are valid, and where the temperature coefficients can be found.
 pub fn temperature_words(of: &ThermalRecord, number: impl Fn(f64) -> String) -> String {
     let triad = |(name, sensor): (&str, Sensor)| {
         let range = of.range.get(sensor);
@@ -164,13 +165,13 @@ pub fn temperature_words(of: &ThermalRecord, number: impl Fn(f64) -> String) -> 
     };
     let triads = [("gyros", Sensor::Gyro), ("accelerometers", Sensor::Accel)].map(triad);
     format!(
-        "The results apply at the reference temperature: {}. They change with temperature; the attached \
+        "The results apply at the reference temperature: {}. The results change with temperature; the attached \
          calibration.json contains the coefficients with their equation and covariance.",
         triads.join("; ")
     )
 }
 
-/// A parameter in words, such as `gyroscope scale factor x`.
+/// The name of a parameter in words, such as `gyroscope scale factor x`.
 pub fn in_words(measured: &str) -> String {
     let words = [
         ("gyro.", "gyroscope "),

@@ -1,4 +1,4 @@
-//! The survey as named values. Angles are in degrees, rates in deg/s, forces in m/s², times in s.
+//! The survey as a set of named values. Angles are in degrees, rates in deg/s, forces in m/s², times in s.
 
 use std::collections::BTreeMap;
 

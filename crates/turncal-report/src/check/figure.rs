@@ -9,12 +9,13 @@ use turncal::run::motion::{Rest, Turn};
 use turncal::survey::Survey;
 
 pub fn figure(run: &Run, survey: &Survey) -> Plot {
-    let mut caption = "Gyro rates and specific force along body axes, from the file with nominal scales. Grey: \
-        dwells, with number and upward axis; above the rates: turns, with axis and angle (angle only if about \
-        several axes), where space permits."
+    let mut caption = "Gyro rates and specific force along the body axes, computed from the log with nominal scales. \
+                       Grey: dwells, with number and upward axis. The labels above the rates give the axis and angle \
+                       of each turn (for turns about several axes, only the angle), where space permits."
         .to_owned();
     if !run.recording.imu.faults.is_empty() {
-        caption += " Crosses: log faults in the samples of the triad; missing and duplicate rows appear in both.";
+        caption += " Crosses: log faults in the samples of this triad; missing and duplicate rows are marked for both \
+        triads.";
     }
     let panels = Sensor::ALL.map(|sensor| panel(run, survey, sensor));
     Plot::new("record.svg", "Recording", (1, 310), panels).caption(caption)

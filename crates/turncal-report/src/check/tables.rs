@@ -38,7 +38,7 @@ pub fn log_columns(run: &Run) -> Table {
         ),
     )
     .section(rows)
-    .note("Body axes are right, front, up. Step: resolution (all values are multiples of it).")
+    .note("Body axes are right, front, up. Step: resolution of the log (all values are multiples of this step).")
 }
 
 /// Columns of the log with triad and axis.
@@ -133,10 +133,11 @@ pub fn dwells(run: &Run, survey: &Survey) -> Table {
     Table::new("Dwells, and the turns after them", headings)
         .section(survey.rests.iter().enumerate().map(row))
         .note(
-            "From nominal scales and prior biases. Tilt: angle between that axis and the vertical. By: right-handed \
-             angle, with the gyro output in the previous dwell as zero; at: maximum rate. Off gravity: angle between \
-             the vertical carried to the next dwell by the gyros and the vertical measured there by the \
-             accelerometers.",
+            "The angles are computed with nominal scales and prior biases. Tilt: angle between the upward axis and the \
+             vertical. By: right-handed angle of the turn, relative to the gyro output in the previous \
+             dwell. At: maximum rate. \
+             Off gravity: angle between the vertical that the gyros carried over to the next dwell and the vertical \
+             that the accelerometers measured there.",
         )
 }
 
@@ -165,7 +166,7 @@ pub fn labels(survey: &Survey) -> Table {
             (Verdict::Position { off, .. }, _) => format!("stationary, {}° off", degrees(off)),
             (Verdict::Turn { angle, off, .. }, Some(LabelledMotion::Turns { .. })) => {
                 let (angle, off) = (signed(angle), degrees(off));
-                format!("turns by {angle}°, its axis {off}° off")
+                format!("turns by {angle}°, about an axis that is {off}° off")
             }
             (Verdict::Unknown | Verdict::Turn { .. }, _) => NONE.to_owned(),
         };
@@ -187,8 +188,9 @@ pub fn labels(survey: &Survey) -> Table {
 pub fn methods(survey: &Survey) -> Table {
     let heading = "What each method could observe, 1σ";
     let mut table = Table::new(heading, group_columns("")).note(
-        "Predicted 1σ in the general form (RMS per group), from the prior σ and a linearisation at the filter start; \
-         for the closed form, from its equations. Noise of hand motion and error terms are not included.",
+        "Predicted 1σ in the general form (RMS per group), from the prior σ and a linearisation at the starting point \
+         of the filter; for the closed form, from its equations. The prediction includes neither the noise of hand \
+         motion nor the error terms.",
     );
     let mut rows = Vec::new();
     for (path, expected) in &survey.methods {
@@ -203,7 +205,8 @@ pub fn methods(survey: &Survey) -> Table {
                 if !expected.unobserved.is_empty() {
                     let names = expected.unobserved.join(", ");
                     table = table.note(format!(
-                        "{words} would leave σ above half of the prior in [imu.prior] for: {names}."
+                        "{words} would leave the σ of these parameters above half of the prior σ in [imu.prior]: \
+                         {names}."
                     ));
                 }
             }

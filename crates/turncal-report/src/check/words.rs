@@ -42,7 +42,7 @@ pub fn signed(angle: f64) -> String {
     format!("{plus}{}", degrees(angle))
 }
 
-/// The log in a sentence or two.
+/// A description of the log in one or two sentences.
 pub fn log(run: &Run, survey: &Survey) -> String {
     let mut text = format!(
         "Stationary for {} s in total, at most {} s at a time; {}.",
@@ -55,7 +55,7 @@ pub fn log(run: &Run, survey: &Survey) -> String {
     );
     if let Some(log) = &run.recording.imu.log {
         text += &format!(
-            " {} rows; time stamps deviate from a uniform clock by {} µs RMS, {} µs at most.",
+            " {} rows; the time stamps deviate from a uniform clock by {} µs RMS, and by {} µs at most.",
             count(log.rows),
             value(log.jitter_rms / MICROSECOND, 1.0),
             value(log.jitter_max / MICROSECOND, 1.0)
@@ -94,7 +94,8 @@ fn warming(run: &Run) -> String {
         if span < SOAKED {
             "soaked within 1 K"
         } else {
-            "not soaked, so parameters may change during the recording (see calibrate --temperature)"
+            "the instrument has not reached a constant temperature, so parameters may change during the recording \
+             (see calibrate --temperature)"
         }
     )
 }
@@ -118,7 +119,7 @@ pub fn of_survey(survey: &Survey) -> Vec<String> {
     findings
 }
 
-/// Disagreement between a label and the recording.
+/// Describes the disagreement between a label and the recording.
 pub fn of_label(check: &LabelCheck) -> Option<String> {
     let said = check.disagreement.as_ref()?;
     let at = value(check.segment.start, 1.0);
@@ -134,8 +135,8 @@ fn of_motion(survey: &Survey) -> Vec<String> {
     if survey.rests.len() < 2 {
         findings.push(format!(
             "The recording has fewer than two dwells. Keep the instrument stationary for {LONG_ENOUGH} s or more \
-             between turns. If the instrument was stationary, bias_sigma of the gyros or the noise in run.toml is too \
-             small: check both."
+             between turns. If the instrument was stationary, check bias_sigma of the gyros and the noise in run.toml: \
+             one of them is too small."
         ));
         return findings;
     }
@@ -151,11 +152,11 @@ fn of_motion(survey: &Survey) -> Vec<String> {
             "Missing positions"
         };
         findings.push(format!(
-            "{positions}: {}. Only {} upward directions differ by {}° or more; without a table, the nine accelerometer \
-             parameters need all six positions or {DIRECTIONS} directions.",
+            "{positions}: {}. There are {} upward directions that are {}° or more apart. Without a table, the nine \
+             accelerometer parameters need all six positions, or {DIRECTIONS} different upward directions.",
             missing.join(", "),
-            survey.directions,
-            degrees(APART)
+            degrees(APART),
+            survey.directions
         ));
     }
     findings
@@ -178,7 +179,7 @@ fn of_methods(survey: &Survey) -> Vec<String> {
         Vec::new()
     } else {
         vec![format!(
-            "With every method, the σ of {} would stay above half of the prior. Add positions and turns.",
+            "With every method, the σ of {} would remain above half of the prior σ. Add positions and turns.",
             always.join(", ")
         )]
     }

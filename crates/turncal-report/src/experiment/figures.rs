@@ -5,7 +5,7 @@ use crate::prelude::*;
 use turncal::study::Experiment;
 use turncal::study::experiment::{Estimator, Navigated, Worth};
 
-/// A panel for each situation, a column of errors for each method.
+/// Figure with a panel for each situation and, in each panel, a column of errors for each method.
 pub fn distribution(experiment: &Experiment) -> Plot {
     let all = experiment.navigations.iter().flat_map(|n| &n.methods);
     let all: Vec<f64> = all.flat_map(|w| w.errors.iter().copied()).collect();
@@ -22,8 +22,9 @@ pub fn distribution(experiment: &Experiment) -> Plot {
     };
     let panels = experiment.navigations.iter().map(panel);
     Plot::new("distribution.svg", "Position error at the end", (1, 330), panels).caption(
-        "Horizontal position error at the end, logarithmic, same axis for all. Small dots: instruments; large \
-         dot with its value: median; line: the middle half; dashed: median error due to instrument noise alone.",
+        "Horizontal position error at the end of navigation, on a logarithmic scale that is the same for all \
+         methods. Small dots: instruments; large dot with its value: median; thick line: the middle half; dashed: \
+         median error caused by instrument noise alone.",
     )
 }
 

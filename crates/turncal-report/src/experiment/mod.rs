@@ -50,22 +50,23 @@ fn facts(experiment: &Experiment) -> Facts {
         (
             "navigation",
             format!(
-                "{} h; stationary and level, heading North, and moving along {}; height fixed to the true value",
+                "{} h; stationary and level, heading North, and moving along {}; the height is fixed to its true \
+                 value",
                 three_digits(hours(experiment)),
                 study.trajectory_name
             ),
         ),
         (
             "alignment",
-            "stationary: level from the calibrated accelerometers and North from the calibrated gyros, or given; \
-             moving: given"
+            "stationary: level from the calibrated accelerometers and North from the calibrated gyros, or a given \
+             attitude; moving: a given attitude"
                 .to_owned(),
         ),
         (
             "noise",
             format!(
-                "not included in the errors of the methods, because it is the same for all; the line \"noise alone\" \
-                 shows its effect on an alignment of {} and on navigation",
+                "not included in the errors of the methods, because it is the same for all of them; the line \"noise \
+                 alone\" shows its effect on an alignment of {} and on navigation",
                 minutes(ALIGNMENT_TIME)
             ),
         ),
@@ -173,7 +174,7 @@ fn compared(
         () => "no significant difference for this number of instruments",
     };
     let text = format!(
-        "{}, {} h: median {} nmile after {}, {} after {}, ratio {by} ({interval}): {judged}.",
+        "{}, {} h: median error {} nmile after {}, {} after {}, ratio {by} ({interval}): {judged}.",
         capital(situation_name(situation)),
         three_digits(hours(experiment)),
         three_digits(filter.at_end.median),
@@ -203,7 +204,7 @@ fn limit(experiment: &Experiment, situation: Situation) -> Option<String> {
         Some(format!("{}: {most}", estimator_name(experiment, estimator)))
     });
     Some(format!(
-        "{}, the largest contributors to the variance are: {}. Noise alone would give a median of {} nmile.",
+        "{}, these groups contribute most to the variance: {}. Noise alone would give a median of {} nmile.",
         capital(situation_name(situation)),
         of.collect::<Option<Vec<_>>>()?.join("; "),
         three_digits(navigated.noise.median)
@@ -228,9 +229,12 @@ fn failures(experiment: &Experiment) -> Vec<String> {
         let first = failed.first().map_or("", |reason| reason.as_str());
         say(
             failed.len(),
-            &format!("calibrations failed, the first because: {first}"),
+            &format!("calibrations failed; the reason for the first failure is: {first}"),
         );
-        say(rejected, "instruments have data that do not fit the form.");
+        say(
+            rejected,
+            "instruments have data that the misalignment form does not fit.",
+        );
         say(
             diverged,
             "calibrations did not converge; the figures include them.",

@@ -1,4 +1,4 @@
-//! The tables, the same for terminal and page.
+//! The tables, which are the same on the terminal and on the page.
 
 use crate::prelude::*;
 use turncal::imu::{InstallationForm, Sensor};
@@ -54,8 +54,8 @@ fn errors(experiment: &Experiment, navigated: &Navigated) -> Table {
         .sections(by_estimator.map(|of_estimator| of_estimator.iter().map(row)))
         .section([last])
         .note(
-            "Over all instruments. Largest: maximum over all minutes. Closed form : EKF: ratio of the medians in the \
-             same misalignment form (above 1, the EKF is better); intervals by bootstrap.",
+            "Over all instruments. Largest: maximum over time, from values at intervals of one minute. Closed form : EKF: ratio of the \
+             medians in the same misalignment form (above 1, the EKF is better); intervals by bootstrap.",
         )
 }
 
@@ -86,8 +86,8 @@ fn paper(experiment: &Experiment, navigated: &Navigated) -> Table {
     let situation = situation_name(navigated.situation);
     let title = format!("Comparison with the paper: errors of one triad alone, {situation}");
     Table::new(title, columns).section(general).sections(of_paper).note(
-        "Position error at the end; the other triad is exact. Paper: after 40 h, one instrument on one table, closed \
-         form (Zhao, Jiang, Li 2016, Figure 10), neither noise nor latitude stated.",
+        "Position error at the end if the other triad has no errors. Paper: after 40 h, for one instrument on one \
+         table with the closed form (Zhao, Jiang, Li 2016, Figure 10); neither noise nor latitude is stated.",
     )
 }
 
@@ -115,7 +115,7 @@ pub fn method_kind(estimator: Estimator) -> &'static str {
     }
 }
 
-/// Name of an estimator with its time to the minute, such as `EKF 10 min`; the facts give the exact value.
+/// Name of an estimator with its table time to the minute, such as `EKF 10 min`; the facts give the exact time.
 pub fn estimator_name(experiment: &Experiment, estimator: Estimator) -> String {
     let minutes = table_time(experiment, estimator).unwrap_or(f64::NAN) / 60.0;
     format!("{} {minutes:.0} min", method_kind(estimator))

@@ -1,4 +1,4 @@
-//! Named values of a comparison; `unit` states the unit of each.
+//! The named values of a comparison; `unit` states the unit of each quantity.
 
 use super::shown::{in_unit, shown, unit_key, verdict};
 use crate::prelude::*;

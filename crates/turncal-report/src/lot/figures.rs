@@ -1,15 +1,15 @@
-//! Figures of a comparison: every calibration with σ and limits.
+//! Figures of a comparison, which show every calibration with its σ and the limits.
 
 use super::shown::{Together, in_unit, shown, together};
 use crate::prelude::*;
 use turncal::lot::{Lot, Quantity, Row, Sample};
 
-/// Every calibration, with a panel for each group.
+/// Figure of all calibrations, with a panel for each group.
 pub fn values(lot: &Lot) -> Plot {
     let panels = together(lot).into_iter().map(|of| panel(lot, &of));
     let what = match (&lot.specification, &lot.truth) {
         (Some(_), _) => {
-            "Calibrations in the given order. Dashed: limits, black if common to all axes"
+            "The calibrations are in the given order. Dashed: limits (black if a limit is common to all axes)"
         }
         (None, Some(_)) => "Differences of the calibrations from the truth",
         (None, None) => "Differences of the calibrations from their mean",

@@ -1,5 +1,4 @@
-//! Report on calibrations side by side: every parameter of each, mean and spread, outliers, differences from a truth,
-//! limits.
+//! Report that compares calibrations: every parameter, mean and spread, outliers, differences from a truth, and limits.
 
 mod data;
 mod figures;
@@ -11,7 +10,7 @@ mod tests;
 use crate::prelude::*;
 use turncal::lot::Lot;
 
-/// The complete report on calibrations side by side.
+/// The complete report that compares calibrations.
 pub fn document(lot: &Lot) -> Document {
     let is_single = lot.rows.len() == 1 && lot.truth.is_none();
     let mut document = Document::new(match (&lot.rows[..], &lot.truth) {

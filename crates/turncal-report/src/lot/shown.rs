@@ -33,17 +33,17 @@ fn unit(quantity: Quantity) -> (&'static str, &'static str, f64) {
     }
 }
 
-/// Symbol of its unit.
+/// Symbol of the unit of a quantity.
 pub fn symbol(quantity: Quantity) -> &'static str {
     unit(quantity).0
 }
 
-/// Unit as a name in files.
+/// The unit as it is written in names of fields in files.
 pub fn unit_key(quantity: Quantity) -> &'static str {
     unit(quantity).1
 }
 
-/// Value and σ in that unit; scale factors as deviation from nominal.
+/// Value and σ in the unit of the quantity; for a scale factor, the value is the deviation from nominal.
 pub fn shown(quantity: Quantity, of: Sample) -> (f64, f64) {
     let value = match quantity {
         Quantity::Parameter(index) => Group::of(index).shown(of.value),
@@ -52,12 +52,12 @@ pub fn shown(quantity: Quantity, of: Sample) -> (f64, f64) {
     (value, in_unit(quantity, of.sigma))
 }
 
-/// A difference of values in that unit.
+/// A difference of values, in the unit of the quantity.
 pub fn in_unit(quantity: Quantity, of: f64) -> f64 {
     of / unit(quantity).2
 }
 
-/// A difference with its σ, if it has one, in that unit.
+/// A difference with its σ, if there is one, in the unit of the quantity.
 pub fn difference(quantity: Quantity, of: Sample) -> String {
     plus_minus(in_unit(quantity, of.value), in_unit(quantity, of.sigma))
 }
@@ -74,9 +74,9 @@ pub fn spread(quantity: Quantity, of: &Spread) -> String {
 
 /// Quantities shown together.
 pub struct Together {
-    /// Heading, with the unit.
+    /// Heading of the quantities, with their unit.
     pub heading: String,
-    /// The name of each quantity below that heading.
+    /// The name of each quantity below the heading.
     pub names: Vec<String>,
     /// The quantities.
     pub quantities: Vec<Quantity>,

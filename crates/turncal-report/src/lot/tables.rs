@@ -69,8 +69,8 @@ pub fn units(lot: &Lot) -> Table {
     }
     if lot.rows.len() > 2 {
         table = table.note(format!(
-            "Outlier: farther from the mean of the others than their scatter explains (false-alarm rate {} % for all \
-             rows together); excluded from mean, scatter and spread.",
+            "Outlier: farther from the mean of the other values than their scatter explains (false-alarm rate {} % \
+             for all rows together); outliers are excluded from mean, scatter and spread.",
             100.0 * FALSE_ALARM
         ));
     }
@@ -122,8 +122,8 @@ fn verdict(row: &Row) -> String {
     }
 }
 
-/// Every quantity: the calibrations side by side if they are few, with truth or difference; mean and scatter of three
-/// or more.
+/// Table of every quantity. Up to a few calibrations are shown side by side, with the truth or the difference; for
+/// three or more, the table shows a mean and a scatter.
 pub fn quantities(lot: &Lot) -> Table {
     let mut columns = Columns::<Quantity>(Vec::new());
     columns.push("", title);
@@ -242,40 +242,44 @@ fn notes(lot: &Lot, mut table: Table) -> Table {
     {
         let name = &first.unit.name;
         table = table.note(format!(
-            "No calibration states nominal scale factors: K is the deviation from K of {name}."
+            "No calibration states nominal scale factors, so K is the deviation from K of {name}."
         ));
     }
     table = match &lot.truth {
         Some(truth) => table.note(format!(
-            "Calibrations: difference from {} ± 1σ; ! marks differences beyond {FLAGGED} σ.",
+            "Each column: difference from {} ± 1σ; ! marks differences of more than {FLAGGED} σ.",
             truth.unit.name
         )),
         None if lot.rows.len() == 2 => table.note(format!(
-            "± 1σ. The difference is valid only for calibrations from different data; ! marks differences beyond {FLAGGED} σ."
+            "± 1σ. The σ of the difference is valid only if the calibrations are from different data; ! marks \
+             differences of more than {FLAGGED} σ."
         )),
         None => table,
     };
     if lot.rows.len() > 2 {
         table = table
-            .note("Mean: weighted by spread and σ, ± its 1σ. Scatter: sample standard deviation.")
+            .note("Mean: weighted by spread and σ, ± 1σ of the mean. Scatter: sample standard deviation.")
             .note(format!(
-                "χ²/n: scatter compared with the stated σ; p: probability of a larger value if these σ alone explain \
-                 it; ! marks scatter that is not explained (false-alarm rate {} % for all rows together).",
+                "χ²/n: scatter compared with the stated σ; p: probability of at least this scatter if the stated σ \
+                 alone cause it; ! marks scatter that the σ do not explain (false-alarm rate {} % for all rows \
+                 together).",
                 100.0 * FALSE_ALARM
             ))
-            .note("Spread: 1σ between units after subtracting their σ, or its 95 % limit if not significant.");
+            .note("Spread: 1σ between units after subtraction of their σ, or the 95 % limit of the spread if it is \
+            not significant.");
     }
     if let Some(gravity) = lot.shared_gravity.filter(|_| lot.rows.len() > 1) {
         table = table.note(format!(
-            "The gravity error, the same for all calibrations (1σ {} ppm), is part of every σ of accelerometer K and \
-             of the σ of their mean, but not of the scatter or of differences between calibrations.",
+            "The gravity error, which is the same for all calibrations (1σ {} ppm), is part of every σ of \
+             accelerometer K and of the σ of their mean, but not of the scatter or of differences between \
+             calibrations.",
             sigma(gravity / PPM)
         ));
     }
     match lot.joint {
         Some(joint) => table.note(format!(
-            "All parameters with their correlations: χ²/n {}, n = {}, p = {}. Near 0, the calibrations differ by more \
-             than their σ; near 1, the σ are too large.",
+            "All parameters with their correlations: χ²/n {}, n = {}, p = {}. If p is near 0, the calibrations differ \
+             by more than their σ; if p is near 1, the σ are too large.",
             ratio(joint.value / joint.freedom as f64),
             count(joint.freedom),
             chance(joint.p)
@@ -284,7 +288,8 @@ fn notes(lot: &Lot, mut table: Table) -> Table {
     }
 }
 
-/// Every limit of a single unit, exceeded ones first; for several units, only limits that are exceeded or undecided.
+/// For a single unit, all limits (exceeded limits first); for several units, only limits that are exceeded or
+/// undecided.
 pub fn limits(lot: &Lot) -> Table {
     let row = |row: &Row, check: &Check| {
         let quantity = check.quantity();
@@ -316,7 +321,7 @@ pub fn limits(lot: &Lot) -> Table {
     Table::new(heading, columns("unit | | unit | from nominal | limit | P(within) | verdict"))
         .section(rows)
         .note(
-            "A unit passes a limit if the probability of being within it is at least the stated confidence, and fails \
-             if the probability of being outside is.",
+            "A unit passes a limit if the probability of being within the limit is at least the stated confidence, and \
+             fails if the probability of being outside is at least the stated confidence.",
         )
 }

@@ -26,7 +26,8 @@ pub struct Navigation<'a> {
     pub truth: &'a str,
     /// Verdict of the calibration; `None` if it was not estimated.
     pub verdict: Option<Word>,
-    /// Whether one of the two has error terms in addition to K, E and D (navigation does not use them).
+    /// Whether the calibration or the truth has error terms in addition to K, E and D; navigation does not use error
+    /// terms.
     pub terms: bool,
     /// Definition of the body axes.
     pub body_frame: BodyFrame,
@@ -34,7 +35,7 @@ pub struct Navigation<'a> {
     pub only: Option<Sensor>,
     /// Motion of the body and its duration.
     pub mission: &'a Mission,
-    /// Name of the trajectory, if it moved.
+    /// Name of the trajectory, if the body moved.
     pub trajectory: Option<&'a str>,
     /// The errors.
     pub navigated: &'a MethodOutlook,
@@ -105,11 +106,12 @@ impl Navigation<'_> {
             ));
         }
         if self.navigated.outlook.iter().any(|m| m.sigma.is_none()) {
-            warnings.push(format!("{name} states no σ, so none is predicted."));
+            warnings.push(format!(
+                "{name} states no σ, so turncal cannot predict the σ of the navigation errors."
+            ));
         }
         if self.terms {
-            let text =
-                "Only errors of K, E and D are included; other error terms are assumed exact.";
+            let text = "Only errors of K, E and D are included; all other error terms are assumed to be exact.";
             warnings.push(text.to_owned());
         }
         warnings
@@ -139,7 +141,8 @@ impl Navigation<'_> {
 
     /// Attitude, velocity and position against time with their predicted σ as a band.
     fn figures(&self) -> [Plot; 3] {
-        let horizontal = " Horizontal: magnitude of both components, with its predicted RMS.";
+        let horizontal =
+            " Horizontal: magnitude of the east and north components, with its predicted RMS.";
         let figures = [
             ("attitude.svg", "Attitude error", ""),
             ("velocity.svg", "Velocity error", horizontal),
@@ -152,8 +155,8 @@ impl Navigation<'_> {
             let panels = quantities.map(|of| outlook::panel(*of, navigated));
             Plot::new(file, heading, (1, 210), panels).caption(format!(
                 "Computed minus true. Line: actual error from full navigation; band: ±1σ predicted from the \
-                 covariance of the calibration with the linear model. At any time, about two calibrations in three \
-                 have errors within the band.{more}"
+                 covariance of the calibration with the linear model. At any given time, about two calibrations in \
+                 three have errors within the band.{more}"
             ))
         })
     }

@@ -9,7 +9,7 @@ const HEADING: &str = "Navigation with this calibration";
 /// One mission, navigated with several calibrations.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Flown {
-    /// Motion of the body, such as `stationary and level`.
+    /// Motion of the body in words, such as `stationary and level`.
     pub how: &'static str,
     /// Conclusion, in a sentence.
     pub shows: &'static str,
@@ -36,7 +36,7 @@ pub fn add_missions(document: &mut Document, methods: &[String], missions: &[Flo
     document.brief.insert(1, table.into());
 }
 
-/// Adds table and figure.
+/// Adds the table and the figure.
 pub fn add(document: &mut Document, navigation: Result<&[MethodOutlook], &NavigationStudyError>) {
     match navigation {
         Err(reason) => {
@@ -46,8 +46,9 @@ pub fn add(document: &mut Document, navigation: Result<&[MethodOutlook], &Naviga
         Ok([]) => {}
         Ok(navigated @ [.., last]) => {
             let how = format!(
-                "{} stationary and level at the site of the run, heading North, from perfect alignment, height \
-                 fixed, for as long as predicted errors stay small (1° and 1 % of the Earth's radius).",
+                "{} stationary and level at the site of the run, heading North, from perfect alignment, with fixed \
+                 height. The duration is limited so that the predicted errors stay small (below 1° and 1 % of the \
+                 Earth's radius).",
                 long(navigated)
             );
             document.page(table(HEADING, navigated).note(how));
@@ -78,7 +79,7 @@ fn long(navigated: &[MethodOutlook]) -> String {
     format!("{} {unit}", value(duration(navigated) / size, 10.0))
 }
 
-/// The position at the end in one line.
+/// One line with the position error at the end.
 pub fn line(navigated: &[MethodOutlook]) -> String {
     let [.., horizontal] = Quantity::ALL;
     let ends = navigated.iter().filter_map(|of| {
@@ -101,7 +102,7 @@ pub fn line(navigated: &[MethodOutlook]) -> String {
     )
 }
 
-/// Every quantity at the end of navigation, and its maximum if errors are known.
+/// Table of every quantity at the end of navigation, with its maximum if the errors are known.
 pub fn table(heading: &str, navigated: &[MethodOutlook]) -> Table {
     let known = is_known(navigated);
     let (unit_of_time, second) = clock(navigated);
@@ -143,15 +144,15 @@ pub fn table(heading: &str, navigated: &[MethodOutlook]) -> Table {
         row
     };
     let what = if known {
-        "Computed minus true. σ: predicted 1σ of the error at the end,"
+        "Computed minus true values. σ: predicted 1σ of the error at the end,"
     } else {
         "The truth is not known, so no error is shown. σ: predicted 1σ of the error at the end,"
     };
     Table::new(heading, columns)
         .sections(Quantity::ALL.chunks(3).map(|of| of.iter().map(|&of| row(of))))
         .note(format!(
-            "{what} from the calibration's covariance by the linear error model; for horizontal errors, the root mean \
-             square."
+            "{what} from the covariance of the calibration with the linear error model; for horizontal errors, the \
+             root mean square is given."
         ))
 }
 
@@ -177,15 +178,15 @@ fn figure(navigated: &[MethodOutlook], last: &str) -> Plot {
         (
             "Position error in navigation",
             format!(
-                "Computed minus true, from full navigation with perfect alignment, stationary and level, with fixed \
-                 height. Band: ±1σ of the {last} predicted from its covariance."
+                "Computed minus true values, from full navigation with perfect alignment, stationary and level, with \
+                 fixed height. Band: ±1σ of the errors of the {last}, predicted from its covariance."
             ),
         )
     } else {
         (
             "Predicted position error in navigation",
-            "±1σ of the error predicted from the covariance of the calibration, with perfect alignment, stationary \
-             and level, with fixed height."
+            "Predicted ±1σ of the position error, from the covariance of the calibration, for a stationary and level \
+             instrument with perfect alignment and fixed height."
                 .to_owned(),
         )
     };
@@ -196,7 +197,8 @@ fn figure(navigated: &[MethodOutlook], last: &str) -> Plot {
     Plot::new("navigation.svg", heading, (1, 250), panels).caption(caption)
 }
 
-/// Errors against time in a readable unit, over the ±σ band of the last calibration; only σ if no error is known.
+/// Figure of the errors against time in a readable unit, drawn over the ±σ band of the last calibration; if no error is
+/// known, the figure shows only σ.
 pub fn panel(quantity: Quantity, navigated: &[MethodOutlook]) -> Panel {
     let (unit_of_time, second) = clock(navigated);
     let (unit, scale) = quantity.readable_unit(greatest(quantity, navigated));

@@ -1,7 +1,7 @@
 //! Fonts of a printed page: glyphs and widths of characters.
 //!
-//! Both are Noto Sans (SIL Open Font License 1.1, see the file next to the fonts), reduced to Latin, Greek, Cyrillic
-//! and a few signs.
+//! Both fonts are Noto Sans (SIL Open Font License 1.1, see the file next to the fonts), reduced to Latin, Greek,
+//! Cyrillic and a few signs.
 
 use krilla::text::{Font, GlyphId, KrillaGlyph};
 use skrifa::charmap::Charmap;
@@ -27,7 +27,7 @@ pub struct Fonts {
 }
 
 impl Fonts {
-    /// `None` if they cannot be read (the tests exclude this).
+    /// Returns `None` if the fonts cannot be read; the tests ensure that this does not happen.
     pub fn new() -> Option<Self> {
         Some(Self {
             regular: Typeface::new(REGULAR)?,
@@ -62,7 +62,7 @@ impl Typeface {
         self.metrics.advance_width(glyph).unwrap_or(0.0) / self.units_per_em
     }
 
-    /// The characters of a text that it cannot show.
+    /// The characters of a text that the font cannot show.
     pub fn lacks<'a>(&'a self, text: &'a str) -> impl Iterator<Item = char> + 'a {
         text.chars()
             .filter(|&character| self.glyph(character).is_none())

@@ -21,7 +21,7 @@ const NAMES: f32 = 128.0;
 /// Space between table columns.
 const GAP: f32 = 14.0;
 
-/// Drawn content of a page.
+/// The content drawn on a page.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Drawn {
     Text {
@@ -378,14 +378,14 @@ pub enum PdfError {
 /// Page margins and file metadata.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Frame {
-    /// Upper left, and author in the metadata.
+    /// Text at the upper left, also used as the author in the metadata.
     pub left: String,
     /// Upper right.
     pub right: String,
-    /// At the foot, before the page's number.
+    /// Text at the foot of the page, before the page number.
     pub foot: String,
-    /// Below the last line.
+    /// Text below the last line of the document.
     pub end: String,
-    /// Year, month and day of the metadata.
+    /// Year, month and day for the metadata.
     pub day: (u16, u8, u8),
 }

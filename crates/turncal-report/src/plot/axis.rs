@@ -9,7 +9,7 @@ const FEW_DECADES: f64 = 2.5;
 /// Margin at both ends of a logarithmic axis, as a factor.
 const MARGIN: f64 = 1.15;
 
-/// Scaling of an axis.
+/// How an axis is scaled.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Kind {
     /// Linear.
@@ -19,10 +19,10 @@ pub enum Kind {
     Log,
 }
 
-/// Specification of an axis. Its ends are those of the data unless given.
+/// Specification of an axis. Unless its ends are given, the axis ends where the data end.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Axis {
-    /// Title; the panel provides that of the vertical axis.
+    /// Title of a horizontal axis; the title of the vertical axis belongs to the panel.
     pub title: String,
     /// Scaling.
     pub kind: Kind,
@@ -30,12 +30,12 @@ pub struct Axis {
     pub ends: Option<(f64, f64)>,
     /// Values to include in addition to the data.
     pub including: Vec<f64>,
-    /// Margins below and above the data: fractions of their span, factors for a logarithmic axis, positions for an axis
-    /// of names.
+    /// Margins below and above the data, given as fractions of the span of the data, as factors (logarithmic axis), or
+    /// as numbers of positions (axis of names).
     pub room: (f64, f64),
-    /// Names at 0, 1, 2 … instead of numbers.
+    /// Names at the positions 0, 1, 2 …, shown instead of numbers.
     pub places: Vec<String>,
-    /// Whether the axis is not drawn, as in a map.
+    /// Whether the axis is hidden, as in a map.
     pub is_bare: bool,
 }
 
@@ -58,7 +58,7 @@ impl Axis {
         }
     }
 
-    /// An axis with these ends that is not drawn.
+    /// An axis with these ends that is hidden.
     pub fn bare(low: f64, high: f64) -> Self {
         Self {
             is_bare: true,
@@ -92,7 +92,7 @@ impl Axis {
         self
     }
 
-    /// The scale that includes these values.
+    /// The scale that covers these values.
     pub fn scale(&self, values: impl IntoIterator<Item = f64>) -> Scale {
         if !self.places.is_empty() {
             return Scale::places(&self.places, self.room);
@@ -129,7 +129,7 @@ pub struct Scale {
     pub low: f64,
     /// Highest value.
     pub high: f64,
-    /// Values and their labels, the most important first.
+    /// Tick values and their labels, the most important first.
     pub ticks: Vec<(f64, String)>,
 }
 
@@ -204,7 +204,7 @@ impl Scale {
         length / (self.high - self.low)
     }
 
-    /// Position of a value, from 0 at the low to 1 at the high end; values outside are at the end.
+    /// Position of a value, from 0 at the low end to 1 at the high end; values outside the axis are placed at its ends.
     pub fn part(&self, value: f64) -> f64 {
         let straight = |value: f64| match self.kind {
             Kind::Linear => value,

@@ -1,4 +1,4 @@
-//! A plot as a value: panels with axes and series, independent of the renderer.
+//! The description of a plot: panels with axes and series, independent of the renderer.
 
 mod axis;
 mod series;
@@ -12,11 +12,11 @@ pub use series::{Anchor, Color, Mark, Pen, Point, Series, Shape, Upright};
 /// A figure with its file, heading and caption.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plot {
-    /// Name of its file, such as `sigma.svg`.
+    /// Name of the figure's file, such as `sigma.svg`.
     pub file: String,
     /// Heading.
     pub heading: String,
-    /// Instructions for reading it, one or two sentences.
+    /// Caption that says how to read the figure, in one or two sentences.
     pub caption: String,
     /// Panels in a row.
     pub columns: usize,
@@ -35,7 +35,7 @@ pub struct Panel {
     pub x: Axis,
     /// Vertical axis.
     pub y: Axis,
-    /// Series, from back to front.
+    /// Series in drawing order, from back to front.
     pub series: Vec<Series>,
     /// Shaded intervals of the horizontal axis.
     pub shading: Vec<Range<f64>>,
@@ -65,7 +65,7 @@ impl Plot {
         }
     }
 
-    /// Sets the instructions for reading it.
+    /// Sets the caption, which says how to read the figure.
     pub fn caption(mut self, caption: impl Into<String>) -> Self {
         self.caption = caption.into();
         self
@@ -121,7 +121,8 @@ impl Panel {
     }
 }
 
-/// Offset of the n-th of several items from the centre of their position; together they occupy this fraction of it.
+/// Offset of the n-th of several items from the centre of their common position; together, the items use this fraction
+/// of the width of the position.
 pub fn beside(n: usize, count: usize, part: f64) -> f64 {
     part * ((n as f64 + 0.5) / count.max(1) as f64 - 0.5)
 }

@@ -1,19 +1,19 @@
 //! Series in a panel.
 
-/// A series drawn with one pen.
+/// A series of data, drawn with one pen.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
     /// Shape.
     pub shape: Shape,
     /// Pen.
     pub pen: Pen,
-    /// Name at the right end of the panel.
+    /// The name is written at the right end of the panel.
     pub label: Option<String>,
-    /// Name in the title line.
+    /// The name is written in the title line.
     pub key: Option<String>,
 }
 
-/// Abscissa and ordinate. A line is interrupted if one of them is not a number.
+/// Abscissa and ordinate. A line is interrupted where a coordinate is not a number.
 pub type Point = (f64, f64);
 
 /// Abscissa, lower end and upper end.
@@ -26,7 +26,7 @@ pub enum Shape {
     Line(Vec<Point>),
     /// The area between two lines over the same abscissae.
     Band(Vec<Point>, Vec<Point>),
-    /// A mark at each point, on a vertical error bar with caps if its ends differ.
+    /// A mark at each point, with a vertical error bar and caps if the ends of the bar differ.
     Marks(Mark, Vec<(Point, (f64, f64))>),
     /// Bars of this half width.
     Bars(f64, Vec<Upright>),
@@ -50,11 +50,11 @@ pub enum Mark {
 /// Position of a text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Anchor {
-    /// Centred above its point.
+    /// The text is centred above its point.
     Above,
-    /// Centred below its point.
+    /// The text is centred below its point.
     Below,
-    /// Centred on its point.
+    /// The text is centred on its point.
     Middle,
 }
 
@@ -113,7 +113,7 @@ impl Shape {
 }
 
 impl Series {
-    /// A shape with a thin pen of the first colour.
+    /// A series with this shape, drawn with a thin pen in the first colour.
     pub fn new(shape: Shape) -> Self {
         let pen = Pen {
             color: Color::Nth(0),
@@ -128,7 +128,7 @@ impl Series {
         }
     }
 
-    /// Points joined in order; dense data are reduced to the lowest and highest.
+    /// Points joined in order; if the data are dense, only the lowest and highest points of each interval are kept.
     pub fn line(points: impl IntoIterator<Item = Point>) -> Self {
         Self::new(Shape::Line(thinned(points, MOST)))
     }
@@ -155,7 +155,7 @@ impl Series {
         Self::new(Shape::Marks(mark, points.into_iter().collect()))
     }
 
-    /// Points of values with σ, each with an interval of one standard deviation on both sides.
+    /// Points for values with σ, each with an interval of one standard deviation on either side.
     pub fn measured(mark: Mark, points: impl IntoIterator<Item = (f64, f64, f64)>) -> Self {
         let points = points.into_iter();
         Self::whiskers(mark, points.map(|(x, y, own)| ((x, y), (y - own, y + own))))
@@ -204,7 +204,7 @@ impl Series {
         self
     }
 
-    /// Names its right end.
+    /// Writes the name of the series at the right end of the line.
     pub fn label(mut self, text: impl Into<String>) -> Self {
         self.label = Some(text.into());
         self
@@ -220,8 +220,8 @@ impl Series {
 /// Maximum number of points of a line; no panel is wider in pixels.
 const MOST: usize = 1200;
 
-/// About this many points of a line: the lowest and highest of each interval, every gap, and the end, to which the name
-/// of the line refers.
+/// Reduces a line to about this many points: the lowest and highest points of each interval, every gap, and the end,
+/// where the name of the line is written.
 pub fn thinned(points: impl IntoIterator<Item = Point>, most: usize) -> Vec<Point> {
     let points = points.into_iter();
     let (least, greatest) = points.size_hint();

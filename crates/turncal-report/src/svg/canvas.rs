@@ -1,8 +1,8 @@
-//! The canvas for figures, with colours, pens and fonts: plotters draws each mark, and the canvas keeps them in order
-//! with their hover texts.
+//! The canvas for figures, with colours, pens and fonts. The crate plotters draws each mark, and the canvas stores the
+//! marks in order with their hover texts.
 //!
-//! Plotters rounds every coordinate to a whole pixel, so a mark is drawn [`FINE`] times larger and shown at its size.
-//! Sizes here are in displayed pixels.
+//! Plotters rounds every coordinate to a whole pixel, so each mark is drawn [`FINE`] times larger and is then displayed
+//! at its real size. Sizes in this module are in displayed pixels.
 
 use maud::{PreEscaped, html};
 use plotters::element::{DashedPathElement, Drawable, PointCollection};
@@ -14,7 +14,7 @@ use crate::plot::{Color, Panel, Pen, Point, Scale};
 
 pub use plotters::style::text_anchor::{HPos, VPos};
 
-/// Widths at which every figure is drawn, in pixels: a screen, a printed page or tablet, a telephone.
+/// Widths at which every figure is drawn, in pixels: for a screen, for a printed page or tablet, and for a telephone.
 pub const WIDTHS: [u32; 3] = [1200, 720, 360];
 /// Drawn pixels per displayed pixel.
 pub const FINE: f64 = 8.0;
@@ -53,7 +53,7 @@ const DARK: [&str; 12] = [
     "#4fc9a4", "#a9d3f0", "#e08fc0", "#d6c04a",
 ];
 
-/// A style sheet that gives every colour its counterpart on a dark screen; paper stays light.
+/// A style sheet that replaces every colour by its counterpart on a dark screen; printed pages stay light.
 pub fn dark_style() -> String {
     let light = [PAPER, INK, QUIET, GRID, SHADE, BAND].into_iter();
     let rule = |(RGBColor(r, g, b), dark): (RGBColor, &str)| {
@@ -87,7 +87,7 @@ pub fn width(text: &str, scale: f64) -> f64 {
     text.chars().map(of).sum::<f64>() * LETTER * scale
 }
 
-/// A text cut to a width.
+/// The text, cut to this width.
 pub fn shortened(text: &str, room: f64) -> String {
     if width(text, SMALL) <= room {
         return text.to_owned();
@@ -103,7 +103,7 @@ pub fn shortened(text: &str, room: f64) -> String {
 #[derive(Default)]
 pub struct Canvas {
     marks: String,
-    /// Whether marks show their values under a pointer (only wide screens have one).
+    /// Whether marks show their values when the pointer is over them; only wide screens are assumed to have a pointer.
     pub is_hovered: bool,
 }
 
@@ -116,7 +116,7 @@ fn place((x, y): Point) -> (i32, i32) {
 }
 
 impl Canvas {
-    /// All marks, at display size.
+    /// All marks, at the displayed size.
     pub fn inside(&self) -> String {
         let shown = format!("scale({})", FINE.recip());
         html! { g transform=(shown) { (PreEscaped(&self.marks)) } }.into_string()
@@ -159,7 +159,7 @@ impl Canvas {
         self.put(DashedPathElement::new(points, px(6.0), px(4.0), style));
     }
 
-    /// Joins points by a solid line in any colour.
+    /// Joins the points by a solid line in this colour.
     pub fn stroke(&mut self, points: &[Point], color: RGBColor, width: f64) {
         let points: Vec<_> = points.iter().copied().map(place).collect();
         self.put(PathElement::new(
@@ -185,7 +185,7 @@ impl Canvas {
         self.put(Circle::new(place(at), px(radius), style));
     }
 
-    /// Writes text, with the point at this position of the text; `scale` 1 is the usual size.
+    /// Writes text so that the point is at the given position within the text; a `scale` of 1 is the usual size.
     pub fn text(
         &mut self,
         text: &str,
@@ -218,13 +218,13 @@ pub struct Frame<'p> {
     pub x: Scale,
     /// Vertical scale.
     pub y: Scale,
-    /// Left and right end of the axes.
+    /// Positions of the left and right ends of the axes.
     pub across: (f64, f64),
-    /// Upper and lower end.
+    /// Positions of the upper and lower ends of the axes.
     pub down: (f64, f64),
-    /// Left and right end of the panel.
+    /// Positions of the left and right ends of the panel.
     pub ends: (f64, f64),
-    /// Upper end of the panel.
+    /// Position of the upper end of the panel.
     pub top: f64,
 }
 

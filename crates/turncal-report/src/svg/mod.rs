@@ -1,5 +1,6 @@
-//! Draws any plot as an SVG document of some width, in the colours of paper or of a dark screen: margins from the widths
-//! of labels, non-overlapping names at the ends of lines, and spaced ticks. Hovering over a mark shows its values.
+//! Draws any plot as an SVG document with a given width, in the colours of paper or of a dark screen. The margins
+//! follow from the widths of the labels, names at the ends of lines do not overlap, and ticks keep a distance from each
+//! other. Hovering over a mark shows its values.
 
 mod canvas;
 mod grid;
@@ -23,7 +24,7 @@ pub fn draw(plot: &Plot) -> String {
     draw_at(plot, WIDTHS[0])
 }
 
-/// The SVG document of a plot of this width; the narrower it is, the fewer panels are side by side.
+/// The SVG document of a plot with this width; a narrower plot has fewer panels side by side.
 pub fn draw_at(plot: &Plot, width: u32) -> String {
     let mut on = Canvas::default();
     on.is_hovered = width == WIDTHS[0];

@@ -1,11 +1,12 @@
-//! Names along axes and in title lines: broken, turned upward or moved to separate lines if space is short.
+//! Names along axes and in title lines. If space is short, names are broken, turned to read upwards, or moved to
+//! separate lines.
 
 use super::super::plot::{Panel, Scale, Series};
 use super::canvas::{LETTER, SMALL, shortened, width};
 
 /// Distance between lines of text.
 pub const LINE: f64 = 17.0;
-/// Relative size of upward names, which are closest together.
+/// Relative size of names that read upwards, which are closest together.
 pub const UPWARD: f64 = 0.87;
 /// Minimum number of letters in a line of a name.
 const LETTERS: usize = 6;
@@ -18,7 +19,7 @@ const SAMPLE: f64 = 28.0;
 
 /// Labels of the horizontal ticks.
 pub enum Names {
-    /// Lines of each label, below the axis.
+    /// The lines of each label below the axis.
     Across(Vec<Vec<String>>),
     /// Upward labels.
     Upward(Vec<String>),
@@ -26,7 +27,7 @@ pub enum Names {
 
 impl Names {
     /// Labels of the ticks of an axis of this length, in a panel of this height; names that do not fit side by side are
-    /// written upward.
+    /// written upwards.
     pub fn new(x: &Scale, is_places: bool, length: f64, height: f64) -> Self {
         let room = if is_places {
             x.step(length)
@@ -76,7 +77,8 @@ pub fn title(panel: &Panel, room: f64) -> Vec<String> {
     lines.into_iter().map(|line| line.into_owned()).collect()
 }
 
-/// Lines of named series; the first is next to the title, and empty if there is no space.
+/// Lines with the names of the series. The first line is next to the title, and is empty if there is no space for
+/// names.
 pub fn keys(panel: &Panel, room: f64) -> Vec<Vec<&Series>> {
     let mut lines: Vec<(f64, Vec<&Series>)> = vec![(0.0, Vec::new())];
     for series in &panel.series {

@@ -1,4 +1,4 @@
-//! Figures 2 to 9 of the paper: the curve of every sample, their mean and standard deviation.
+//! Figures 2 to 9 of the paper: the curve of every sample, with the mean and standard deviation of all curves.
 
 use super::verdict::title;
 use crate::prelude::*;
@@ -42,7 +42,7 @@ fn caption(table: &Table1, column: &Column) -> String {
     };
     format!(
         "{}, as stated. Thin: errors of {samples}; thick: mean of all; dashed: mean ± one standard deviation. Both \
-         forms of a triad have the same axes.",
+         forms of a triad are drawn with the same axes.",
         title(column.published)
     )
 }

@@ -33,7 +33,7 @@ fn facts(table: &Table1) -> Facts {
     if table.population > study.samples {
         let population = count(table.population);
         samples += &format!(
-            "; the verdicts are based on a population of {population}, of which these are the first"
+            "; the verdicts are based on {population} samples, of which these are the first"
         );
     }
     let source =

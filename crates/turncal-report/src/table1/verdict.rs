@@ -1,4 +1,4 @@
-//! Verdicts on the figures in the paper, in words.
+//! Verdicts in words on the figures in the paper.
 
 use crate::prelude::*;
 use turncal::imu::InstallationForm;
@@ -16,7 +16,7 @@ pub fn short(verdict: &Verdict) -> &'static str {
     }
 }
 
-/// The last column of the table: the verdict if the reading is as stated, otherwise whether the reading gives the
+/// The last column of the table: for the stated reading, the verdict; for other readings, whether the reading gives the
 /// figures in the paper.
 pub fn of_row(column: &Column, row: &Row) -> String {
     match row.reading.kind {
@@ -85,7 +85,7 @@ pub fn sentence(column: &Column) -> String {
     }
 }
 
-/// A column of the paper in words.
+/// The name of a column in the paper, in words.
 pub fn title(published: &Published) -> String {
     let equation = match published.form {
         InstallationForm::ThreeAngle => 10,

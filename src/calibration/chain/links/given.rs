@@ -1,4 +1,4 @@
-//! Quantities given to a part of a dwell, and the resulting states.
+//! Quantities that are given to a part of a dwell, and the states that result from them.
 
 use nalgebra::DMatrix;
 
@@ -11,8 +11,8 @@ use crate::calibration::chain::states::{ATTITUDE, POSITION};
 use crate::calibration::record::Rest;
 use crate::navigation::Block;
 
-/// Quantities given to a part, per state and constant: the moving states at its beginning except position, then rates
-/// and forces.
+/// The quantities given to a part, as linear functions of states and constants: first the states that change within the
+/// part, at its beginning and without position, then rates and forces.
 #[derive(Debug, Clone)]
 pub struct Given {
     pub states: DMatrix<f64>,

@@ -11,9 +11,9 @@ use super::transition::Transition;
 pub struct Link {
     /// Whether a stretch begins here.
     pub begins: bool,
-    /// Number of the recording.
+    /// Number of the recording that contains the link.
     pub recording: usize,
-    /// Number of the dwell.
+    /// Number of the dwell that contains the observations.
     pub dwell: usize,
     /// Computed attitude, if a dwell begins here.
     pub attitude: Option<Matrix3<f64>>,
@@ -21,6 +21,6 @@ pub struct Link {
     pub time: f64,
     pub transition: Transition,
     pub rows: Rows,
-    /// Quantities given to the part.
+    /// Quantities that are given to the part of the dwell.
     pub given: Given,
 }

@@ -1,4 +1,4 @@
-//! Makes links from events.
+//! Makes links from the events of a recording.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -341,7 +341,7 @@ impl<'a, F: FnMut(Link) -> Result<(), CalibrationError>> Maker<'a, F> {
 }
 
 impl Problem<'_> {
-    /// 1σ of the slip in one move over that of a position.
+    /// 1σ of the slip in one move, divided by the 1σ of a table position.
     pub fn slip(&self) -> f64 {
         SLIP / (self.dwells().count().max(1) as f64).sqrt()
     }

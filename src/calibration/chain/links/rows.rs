@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// Observations linear in states and constants, each with noise of σ = 1.
+/// Observations that are linear in states and constants, each with noise of σ = 1.
 #[derive(Debug, Clone)]
 pub struct Rows {
     /// Coefficients of the states.
@@ -22,7 +22,7 @@ impl Rows {
         }
     }
 
-    /// A set of this number of rows, all zero.
+    /// A set of this many rows, all zero.
     pub fn of(self, count: usize) -> Self {
         Self {
             states: DMatrix::zeros(count, self.states.ncols()),

@@ -10,9 +10,10 @@ use crate::calibration::chain::effects::Effect;
 #[derive(Debug, Clone)]
 pub struct Drive {
     pub effect: Effect,
-    /// Number of the event among those of its effect: that of its move, its position, or the dwell that follows it.
+    /// Number of the event among all events of its effect: the number of its move or position, or of the dwell after
+    /// it.
     pub event: usize,
-    /// Change of the states per disturbance, one column each.
+    /// Change of the states for a unit disturbance, one column per disturbance.
     pub by: DMatrix<f64>,
 }
 
@@ -50,13 +51,13 @@ impl Transition {
         self.covariance = states * &self.covariance * states.transpose();
     }
 
-    /// Appends an effect of constants on the states, from the state `first` on.
+    /// Appends an effect of constants on the states, starting with the state `first`.
     pub fn add_constants(&mut self, first: usize, by: &DMatrix<f64>) {
         let mut rows = self.constants.rows_mut(first, by.nrows());
         rows += by;
     }
 
-    /// Appends a disturbance of the states, from the state `first` on.
+    /// Appends a disturbance that acts on the states, starting with the state `first`.
     pub fn drive(&mut self, effect: Effect, event: usize, first: usize, root: &DMatrix<f64>) {
         if root.amax() > 0.0 {
             let mut by = DMatrix::zeros(self.offset.len(), root.ncols());

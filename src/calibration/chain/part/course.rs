@@ -1,8 +1,8 @@
 //! Covariances and gains along the steps and observations of a part.
 //!
-//! They depend on the sequence of steps and observations, not on what was observed (Gelb, *Applied Optimal Estimation*,
-//! §4.2), and at rest not on the attitude either, because gravity and Earth rate are constant in East-North-Up. Most
-//! parts therefore repeat the sequence of the preceding part.
+//! Covariances and gains depend on the sequence of steps and observations, not on the observed values (Gelb, *Applied
+//! Optimal Estimation*, §4.2). At rest they do not depend on the attitude either, because gravity and Earth rate are
+//! constant in East-North-Up. Most parts therefore repeat the sequence of the preceding part.
 
 use nalgebra::Matrix3;
 
@@ -23,7 +23,7 @@ pub struct StepModel<const M: usize> {
 /// a state.
 const KEPT: usize = 32;
 
-/// The sequence of a part, kept as far as the next part repeats it.
+/// The sequence of a part. The next part reuses this sequence as far as the two sequences agree.
 pub struct Course<const M: usize, const G: usize> {
     pub models: Vec<StepModel<M>>,
     /// All events, with the gains of observations.
@@ -46,16 +46,16 @@ enum Event {
 
 /// Gain of an observation for given `g`.
 pub struct Gain<const M: usize, const G: usize> {
-    /// Lower triangular root of its covariance.
+    /// Lower triangular root of the covariance of the observation.
     pub root: Matrix3<f64>,
-    /// Rows of `g`, whitened by this root.
+    /// Rows in `g`, whitened by this root.
     pub rows: [[f64; G]; 3],
     /// Gain of the moving states from the whitened observation.
     pub of_errors: [[f64; M]; 3],
     pub log_determinant: f64,
 }
 
-/// Moving states `U g + m` for given `g`, and information on `g`.
+/// States `U g + m` that change within the part, for given `g`, and the information on `g`.
 #[derive(Clone)]
 pub struct Known<const M: usize, const G: usize> {
     /// Matrix U.
@@ -95,7 +95,7 @@ impl<const M: usize, const G: usize> Course<M, G> {
         }
     }
 
-    /// Starts a part with these models; events of other models are dropped.
+    /// Starts a part with these models; stored events with other models are dropped.
     pub fn begin(&mut self, models: Vec<StepModel<M>>) {
         let pairs = self.models.iter().zip(&models);
         let alike = pairs.take_while(|(one, other)| one == other).count();

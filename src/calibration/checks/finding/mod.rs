@@ -17,10 +17,10 @@ const MATTERS: f64 = 1.5;
 /// A finding of a check: the problem, its meaning for the result and the remedy, with figures.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Finding {
-    /// The code of its kind, such as `W04`.
+    /// The code of the kind of finding, such as `W04`.
     #[serde(default)]
     pub code: String,
-    /// The name of its kind, such as `not-observed`.
+    /// The name of the kind of finding, such as `not-observed`.
     pub kind: String,
     /// Severity, if it differs from that of its kind.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -44,19 +44,19 @@ impl Finding {
         }
     }
 
-    /// A fault repaired by the file reader, or a statement without effect.
+    /// A finding about a fault that the file reader repaired, or about a statement without effect.
     pub fn of_recording(note: String) -> Self {
         let figures = serde_json::json!({ "note": note });
         Self::new(Kind::Recording, note, figures)
     }
 
-    /// A statement that contradicts the recording.
+    /// A finding about a statement that contradicts the recording.
     pub fn of_statement(doubt: String) -> Self {
         let figures = serde_json::json!({ "doubt": doubt });
         Self::new(Kind::StatementDoubted, doubt, figures)
     }
 
-    /// The finding, reduced to a note if σ grew by less than half, because the σ include the cause.
+    /// The finding; if the σ include the effect and increased by less than half, it is reduced to a note.
     pub fn of_growth(self, growth: f64) -> Self {
         if growth < MATTERS {
             self.at(Level::Note)
@@ -65,7 +65,7 @@ impl Finding {
         }
     }
 
-    /// A copy with another severity than that of its kind.
+    /// A copy whose severity differs from that of its kind.
     pub fn at(self, level: Level) -> Self {
         Self {
             level: Some(level),
@@ -73,7 +73,7 @@ impl Finding {
         }
     }
 
-    /// Severity. Unknown kinds, from another version, have the level of care.
+    /// Severity. Kinds from another version that this version does not know have the level `care`.
     pub fn level(&self) -> Level {
         let of_kind = || Kind::named(&self.kind).map_or(Level::Care, Kind::level);
         self.level.unwrap_or_else(of_kind)
@@ -107,7 +107,7 @@ pub fn triad_name(sensor: Sensor) -> &'static str {
     }
 }
 
-/// The widening of σ in words: in percent below a factor of two, otherwise as a factor.
+/// A phrase that states how much σ was widened: in percent below a factor of two, otherwise as a factor.
 pub fn widened_by(growth: f64) -> String {
     if growth < 2.0 {
         format!("by up to {:.0} %", 100.0 * (growth - 1.0))

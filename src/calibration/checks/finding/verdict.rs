@@ -26,7 +26,7 @@ pub enum Word {
     /// Every limit of a specification is met.
     #[serde(rename = "pass")]
     Pass,
-    /// No limit is exceeded with certainty, but some may be.
+    /// No limit is certainly exceeded, but some may be exceeded.
     #[serde(rename = "undecided")]
     Undecided,
     /// A limit is exceeded.
@@ -35,7 +35,7 @@ pub enum Word {
 }
 
 impl Word {
-    /// Its CSS class on a page.
+    /// The CSS class of the verdict on a page.
     pub fn class(self) -> &'static str {
         match self {
             Self::Good | Self::Pass => "good",
@@ -59,12 +59,12 @@ impl fmt::Display for Word {
     }
 }
 
-/// A word, with the codes of the findings that cause it.
+/// A verdict, with the codes of the findings that lead to it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Verdict {
     /// The word.
     pub word: Word,
-    /// Codes such as `W07`; empty for a good result.
+    /// Codes such as `W07`; the list is empty for a good result.
     pub reasons: Vec<String>,
 }
 

@@ -1,9 +1,8 @@
 //! Observability: which combinations of parameters a path determined.
 //!
-//! In units of the prior σ, the prior covariance is a unit sphere. There, the eigenvectors of the
-//! posterior covariance are the independently observed directions; the root of an eigenvalue is the
-//! remaining part of the prior σ (Ham and Brown 1983, "Observability, eigenvalues, and Kalman
-//! filtering", IEEE Trans. AES-19).
+//! In units of the prior σ, the prior covariance is a unit sphere. In these units, the eigenvectors of the posterior
+//! covariance are the independently observed directions, and the root of each eigenvalue is the remaining part of the
+//! prior σ (Ham and Brown 1983, "Observability, eigenvalues, and Kalman filtering", IEEE Trans. AES-19).
 
 mod not_observed;
 
@@ -42,13 +41,14 @@ pub struct Observability {
 /// A combination of parameters, each in units of its prior σ, with its observability in a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Direction {
-    /// Posterior over prior σ of the combination, from 0 (known) to 1 (not observed).
+    /// Posterior σ of the combination divided by its prior σ, from 0 (known) to 1 (not observed).
     pub remaining: f64,
     /// A description such as `gyro scale z with gyro bias z` or `gyro misalignment xy against gyro misalignment yx`:
-    /// `with` for the same sign, `against` for the opposite sign of parameters and of the initial attitude that is
-    /// correlated with them.
+    /// `with` means that the parameters (and the initial attitude that is correlated with them) have the same sign,
+    /// `against` that they have opposite signs.
     pub words: String,
-    /// Name and component of its major parameters, the largest positive; the squares of all components sum to one.
+    /// Names and components of the major parameters in the combination; the largest component is positive, and the
+    /// squares of all components sum to one.
     pub parts: BTreeMap<String, f64>,
 }
 

@@ -12,7 +12,7 @@ use crate::units::DEGREE;
 
 /// All findings on quantities that the path of a filter's run does not determine.
 ///
-/// Parameters that are far from their prior are known; the prior is wrong.
+/// Parameters that are far from their prior count as determined, because this distance shows that the prior is wrong.
 pub fn not_observed_by_path(outcome: &Outcome, far: Option<&Finding>) -> Vec<Finding> {
     let (form, hidden) = (outcome.estimate.form(), outcome.unobserved().into_iter());
     let mut parameters: Vec<String> = hidden.filter_map(|i| parameter_name(form, i)).collect();
@@ -68,14 +68,14 @@ pub fn not_observed(by: &str, parameters: Vec<String>) -> Option<Finding> {
             "gyro.installation",
             "turns of at least 90° about the other axes",
         ),
-        ("gyro.bias", "longer dwells with different axes up"),
+        ("gyro.bias", "longer dwells with other axes up"),
         ("accel", "dwells with each axis up and each axis down"),
     ];
     let remedies = remedies.iter().filter(|(group, _)| has(group));
     let remedies: Vec<&str> = remedies.map(|(_, remedy)| *remedy).collect();
     let text = format!(
-        "Not determined by {by} (σ is still more than half of the prior): {}. The stated values are kept; do not use \
-         them as calibrated. Add {}.",
+        "Not determined by {by} (σ is still more than half of the prior σ): {}. turncal kept the stated values; do \
+         not use them as calibrated values. Add {}.",
         listed(&parameters),
         remedies.join(", and ")
     );
@@ -87,8 +87,8 @@ pub fn not_observed(by: &str, parameters: Vec<String>) -> Option<Finding> {
 fn constants_not_observed(constants: Vec<String>) -> Option<Finding> {
     let text = format!(
         "This path does not determine these constants of the table or of error terms, which keep their stated \
-         values: {}. The σ of K, E and D include their uncertainty. Add dwells at other table angles, or leave the \
-         terms out.",
+         values: {}. The σ of K, E and D include the uncertainty of these constants. Add dwells at other table \
+         angles, or leave these terms out.",
         listed(&constants)
     );
     let figures = json!({ "by": "this path", "parameters": constants });
@@ -100,7 +100,7 @@ fn constants_not_observed(constants: Vec<String>) -> Option<Finding> {
 pub fn temperature_not_seen(parameters: Vec<String>) -> Option<Finding> {
     let text = format!(
         "The temperature dependence of these parameters is unknown: {}. Their σ are valid only at the recorded \
-         temperatures. Record turns at more temperatures to determine this dependence.",
+         temperatures. To determine this dependence, record turns at more temperatures.",
         listed(&parameters)
     );
     let figures = json!({ "parameters": parameters });
@@ -110,8 +110,8 @@ pub fn temperature_not_seen(parameters: Vec<String>) -> Option<Finding> {
 /// The finding on unobserved combinations of parameters that are observed individually, if any.
 fn combinations(combinations: Vec<String>) -> Option<Finding> {
     let text = format!(
-        "This path determines each of these parameters, but not their combination: {}. Add positions or turns that \
-         separate the parameters.",
+        "This path determines each of these parameters, but not their combination: {}. Add positions or turns in \
+         which these parameters have different effects.",
         combinations.join("; ")
     );
     let figures = json!({ "combinations": combinations });
@@ -129,8 +129,8 @@ fn heading(sigma_rad: f64) -> Finding {
         String::new()
     };
     let text = format!(
-        "Heading could not be determined{known}: the gyros are too noisy to sense Earth rate, or their biases mask \
-         it. The other parameters were estimated nevertheless. If you need the heading, log a turntable or make the \
+        "The heading could not be determined{known}: the gyros are too noisy to sense Earth rate, or their biases \
+         mask it. The other parameters were estimated nevertheless. If you need the heading, log a turntable or make the \
          dwells longer."
     );
     let figures = json!({ "sigma_rad": sigma_rad });

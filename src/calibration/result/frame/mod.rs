@@ -18,7 +18,7 @@ use crate::calibration::{
 };
 use crate::imu::{AXES, BodyFrame, InstallationForm, Nominal, PerSensor, Sensor, Triad};
 
-/// A record with its name in messages.
+/// A calibration file, and the name that messages use for it.
 #[derive(Debug, Clone, Copy)]
 pub struct Named<'a> {
     /// Name.
@@ -28,10 +28,10 @@ pub struct Named<'a> {
 }
 
 /// Converts two records to the general form, a common body frame and these nominal scales. A record without units is
-/// assumed to have those of the other.
+/// assumed to have the units of the other record.
 ///
 /// # Errors
-/// [`ComparisonError`] if the units differ or a record cannot be converted.
+/// Returns [`ComparisonError`] if the units differ or a record cannot be converted.
 pub fn in_common_form(
     first: Named,
     second: Named,
@@ -62,20 +62,20 @@ pub fn in_common_form(
 pub struct Canonical {
     /// The body frame.
     pub body_frame: BodyFrame,
-    /// Both triads, in the general form.
+    /// Both triads in the general form.
     pub triads: PerSensor<Triad>,
-    /// Covariance of their parameters, with zero rows and columns for parameters not estimated; `None` if the record
-    /// states no σ.
+    /// Covariance of the parameters, with zero rows and columns for parameters that were not estimated; `None` if the
+    /// calibration states no σ.
     pub covariance: Option<ParameterMatrix>,
-    /// Whether the record gives correlations; if not, its errors are treated as independent.
+    /// Whether the calibration states correlations; if it does not, its errors are treated as independent.
     pub correlated: bool,
-    /// Auxiliary constants by name; to first order, they do not depend on the body frame.
+    /// Auxiliary constants by name; to first order, these do not depend on the body frame.
     pub constants: BTreeMap<String, TermRecord>,
 }
 
 impl Canonical {
-    /// Converts a record to a body frame and nominal scales. A record in the accelerometer frame cannot be converted to
-    /// the table frame, because the table was not observed.
+    /// Converts a record to a body frame and nominal scales. A calibration in the accelerometer frame cannot be
+    /// converted to the table frame, because the table was not observed.
     pub fn new(
         name: &str,
         record: &Calibration,
@@ -129,8 +129,8 @@ impl Canonical {
 }
 
 impl Estimate {
-    /// The estimate in the general form; parameters that the form fixed get the covariance that follows from the form's
-    /// parameters.
+    /// The estimate in the general form; parameters that the form fixed get the covariance that follows from the
+    /// parameters of the form.
     pub fn in_general_form(&self) -> Self {
         let j = self.to_general_form(BodyFrame::Table);
         Self {
@@ -151,8 +151,8 @@ impl Estimate {
     }
 }
 
-/// Triads in any body axes, converted to the axes of a body frame; unchanged for the table frame, because they do not
-/// determine it.
+/// Triads in any body axes, converted to the axes of a body frame; unchanged for the table frame, because the triads do
+/// not determine this frame.
 pub fn in_body_frame(triads: &PerSensor<Triad>, body_frame: BodyFrame) -> PerSensor<Triad> {
     if body_frame == BodyFrame::Table {
         return *triads;
@@ -192,8 +192,8 @@ pub fn own_nominal(record: &Calibration) -> PerSensor<Nominal> {
     })
 }
 
-/// `R` from the given body frame to the accelerometer frame: `a Rᵀ` is lower triangular. Its rows are those of `a`,
-/// made orthonormal one after the other; NaN if `a` does not span the space.
+/// `R` from the given body frame to the accelerometer frame: `a Rᵀ` is lower triangular. The rows of `R` are the rows
+/// of `a`, orthonormalised one after the other; NaN if `a` does not span the space.
 pub fn accelerometer_frame(a: &Matrix3<f64>) -> Matrix3<f64> {
     let rows: [Vector3<f64>; 2] = [0, 1].map(|i| a.row(i).transpose());
     let x = rows[0].normalize();

@@ -8,15 +8,15 @@ use super::statement::Mounting;
 /// A statement in `run.toml` that the recording contradicts.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Contradiction {
-    /// Axes that are swapped, reversed or left-handed.
+    /// Axes are swapped, reversed or left-handed.
     Axes(Mounting),
-    /// A triad with a sensitivity different from the stated one.
+    /// A triad has a sensitivity different from the stated one.
     Sensitivity(Sensitivity),
-    /// Table quaternions in a different order or inverted, in words.
+    /// Table quaternions are in a different order or inverted; contains a description in words.
     Quaternions(String),
-    /// Motion that no hypothesis explains.
+    /// No hypothesis explains the motion.
     Unexplained,
-    /// Gyro and accelerometer columns swapped.
+    /// The gyro and accelerometer columns are swapped.
     Exchanged,
 }
 
@@ -27,9 +27,10 @@ impl fmt::Display for Contradiction {
             Self::Sensitivity(sensitivity) => sensitivity.fmt(f),
             Self::Quaternions(said) => f.write_str(said),
             Self::Unexplained => f.write_str(
-                "the gyros, the accelerometers and the motion stated in run.toml contradict each other, and no other \
-                 axis order or sensitivity resolves this. Look at the turns in turncal check for logs of different \
-                 runs or clocks, lost rows, wrong labels or a dead axis",
+                "the gyros, the accelerometers and the motion stated in run.toml contradict each other, and no \
+                 different axis order or sensitivity removes the contradiction. Compare with the turns that turncal \
+                 check shows: the logs may be from different runs or clocks, rows may be lost, labels may be wrong, \
+                 or an axis may be dead",
             ),
             Self::Exchanged => f.write_str(
                 "the gyro and accelerometer columns are swapped: gravity appears in the columns that run.toml names \

@@ -1,7 +1,7 @@
 //! Likelihood of each axis order of a triad, given the motion of a recording.
 //!
-//! All vectors are in the axes of the columns: an order rotates the known quantities, not the measurements, so the
-//! errors of the triads have the same meaning for each.
+//! All vectors are in the axes of the columns. An axis order rotates the known quantities and not the measurements, so
+//! the errors of the triads have the same meaning for every order.
 
 use nalgebra::{Matrix3, Vector1, Vector3};
 
@@ -11,8 +11,8 @@ use crate::calibration::parameters::{ParameterVector, parameter};
 use crate::calibration::start::equations::{Equations, OfTriad, Rows, of, of_sensitivity};
 use crate::imu::{AxisOrder, PerSensor, Sensor};
 
-/// Factors by which stated noise and prior may be too small. All are equally likely, so that neither an inaccurate
-/// prior nor non-white motion favours another axis order.
+/// Factors by which stated noise and prior may be too small. All factors are equally likely, so neither an inaccurate
+/// prior nor non-white motion favours a wrong axis order.
 #[derive(Debug, Clone, Copy)]
 pub struct TooSmall {
     pub noise: &'static [f64],
@@ -22,13 +22,13 @@ pub struct TooSmall {
 const FACTORS: [f64; 7] = [1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0];
 
 impl TooSmall {
-    /// Noise and prior too small by any factor.
+    /// Noise and prior may be too small by any factor.
     pub const ANY: Self = Self {
         noise: &FACTORS,
         prior: &FACTORS,
     };
 
-    /// Noise too small by a factor of at most ten, the prior by three.
+    /// The noise may be too small by a factor of up to ten, the prior by a factor of up to three.
     pub const CARELESS: Self = Self {
         noise: FACTORS.split_at(3).0,
         prior: FACTORS.split_at(2).0,
@@ -42,7 +42,7 @@ pub struct Errors {
     pub too_small: TooSmall,
 }
 
-/// Log-likelihood of each order, and of no order.
+/// Log-likelihood of each order, and of the hypothesis that no order fits.
 #[derive(Debug, Clone)]
 pub struct Likelihoods {
     pub of: Vec<f64>,

@@ -1,10 +1,10 @@
-//! Axes that are swapped, reversed or left-handed, in either triad or between instrument and table: turncal finds them
-//! before the first pass and reports the corrected line for `run.toml`.
+//! Detection of axes that are swapped, reversed or left-handed, in either triad or between instrument and table.
+//! turncal finds such axes before the first pass and reports the corrected line for `run.toml`.
 //!
-//! Each of the 48 signed permutations of each triad is a hypothesis, weighted by its marginal likelihood: the prior
-//! errors of the triads are integrated out, and so are factors by which the stated prior and noise may be too small.
-//! The decision thus depends only on likelihood ratios, not on the size of residuals. A likelihood ratio of X in favour
-//! of a wrong hypothesis occurs at most once in X recordings.
+//! Each of the 48 signed permutations of each triad is a hypothesis, weighted by its marginal likelihood. The prior
+//! errors of the triads, and factors by which the stated prior and noise may be too small, are integrated out. The
+//! decision thus depends only on likelihood ratios, not on the size of residuals. A likelihood ratio of X in favour of
+//! a wrong hypothesis occurs at most once in X recordings.
 
 mod contradiction;
 mod likelihood;
@@ -62,7 +62,7 @@ fn known_from(problem: &Problem, motion: &Motion) -> &'static str {
     match problem.model.aiding {
         Aiding::Table => "the table attitudes",
         Aiding::Velocity if motion.labels.is_empty() => {
-            "the gravity direction before and after moves and Earth rate"
+            "gravity directions before and after moves, and Earth rate"
         }
         Aiding::Velocity => "the labels and the gravity direction before and after moves",
     }
@@ -214,8 +214,8 @@ impl Part {
     }
 }
 
-/// The log-likelihood of each gyro axis order, and of no explanation, given the motion of a run with the dwells of a
-/// problem; the accelerometer axes are as stated.
+/// The log-likelihood of each gyro axis order, and of the hypothesis that no order fits, given the motion of a run with
+/// the dwells of a problem. The accelerometer axes are assumed to be as stated.
 pub fn orders_of_gyros(problem: &Problem, run: &Run) -> Vec<(AxisOrder, f64, f64)> {
     let hypotheses = Hypotheses::of(problem, run, &Motion::of(problem, 0, run));
     let weighed = |gyro| {

@@ -1,4 +1,4 @@
-//! Motion in a recording, in column axes: dwells, moves between them, labelled sections.
+//! Motion in a recording, along the axes of the columns: dwells, the moves between them, and labelled sections.
 
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -22,10 +22,10 @@ const FLOOR: f64 = 1e-4;
 /// is ambiguous.
 const LEG: f64 = 1.0;
 
-/// A vector as measured in column axes, and as known in body axes.
+/// A vector that is measured in column axes and known in body axes.
 #[derive(Debug, Clone)]
 pub struct Sensed {
-    /// Measured vector divided by gravity or Earth rate, or a rotation angle in rad; without the prior bias.
+    /// Measured vector minus the prior bias, divided by gravity or Earth rate; or a measured rotation angle in rad.
     pub found: Vector3<f64>,
     pub known: Option<Vector3<f64>>,
     /// Variance of each component.
@@ -39,7 +39,7 @@ pub struct Move {
     pub from: usize,
     /// Rotation matrix from the body axes after the move to those before it, according to the table.
     pub known: Option<Matrix3<f64>>,
-    /// Rotation from the gyros, unchanged and with all of them reversed.
+    /// Rotation from the gyros, with their signs unchanged and with all signs reversed.
     pub turns: [Turned; 2],
     /// Variance of the rotation about each axis, rad².
     pub variance: f64,
@@ -52,26 +52,28 @@ pub struct Move {
 pub struct Turned {
     /// `C` from the axes after the rotation to the axes before it.
     pub rotation: Matrix3<f64>,
-    /// Effect of the gyro sensitivity on the total rotation, about the axes before the rotation, rad; the zero is the
-    /// output at rest.
+    /// Effect of the gyro sensitivity on the total rotation, about the axes before the rotation, rad. The gyro output
+    /// at rest is used as the gyro zero.
     pub partials: OfTriad<3>,
 }
 
 /// Known motion of one recording.
 #[derive(Debug, Clone)]
 pub struct Motion {
-    /// Dwells: force divided by gravity, rate divided by Earth rate. `known` is set if there is a table log.
+    /// Dwells, with the force divided by gravity and the rate divided by Earth rate. `known` is set if there is a table
+    /// log.
     pub rests: Vec<PerSensor<Sensed>>,
-    /// Moves; with a table, parts of moves from reading to reading, because a whole move may end where it started.
+    /// Moves. With a table, these are parts of moves from one reading to the next, because a whole move may end where
+    /// it started.
     pub moves: Vec<Move>,
-    /// Labelled sections: force divided by gravity, or rotation angle.
+    /// Labelled sections, with the force divided by gravity or the rotation angle.
     pub labels: Vec<(Sensor, Sensed)>,
     /// Vertical component of Earth rate divided by the total, if the site is known.
     pub upward: Option<f64>,
 }
 
 impl Motion {
-    /// Whether the gyros miss any turn by more than this fraction of its angle.
+    /// Whether the angle of any turn from the gyros is wrong by more than this fraction.
     pub fn misses_a_turn(&self, part: f64) -> bool {
         self.moves.iter().any(|of| {
             let turned = &of.turns[0].rotation;
@@ -119,7 +121,7 @@ impl Motion {
     }
 }
 
-/// Gravity, or Earth rate.
+/// Gravity or Earth rate in the navigation frame.
 pub fn unit(run: &Run, sensor: Sensor) -> f64 {
     match sensor {
         Sensor::Gyro => ROTATION_RATE,

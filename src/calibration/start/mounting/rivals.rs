@@ -1,8 +1,8 @@
-//! Statements in `run.toml` that the recording contradicts, before any estimate: axes, the sensitivity of a triad,
-//! swapped triads.
+//! Detection of statements in `run.toml` that the recording contradicts, before any estimate: axes, the sensitivity of
+//! a triad, or swapped triads.
 //!
-//! Each statement competes with alternatives, weighted by the likelihood of the motion, as for axes. A different gyro
-//! sensitivity is searched only if the gyros miss a turn.
+//! Each statement competes with alternatives, weighted by the likelihood of the motion, as for axes. Other gyro
+//! sensitivities are tested only if the gyros measure a turn incorrectly.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -107,7 +107,8 @@ fn is_another(run: &Run, sensor: Sensor, factor: f64) -> bool {
     is_beyond_tolerance(factor, sigma)
 }
 
-/// Whether a sensitivity this many times the stated one is different, rather than a relative prior σ stated too small.
+/// Whether a sensitivity that is this many times the stated one means that the statement is wrong, and not only that
+/// the relative prior σ is too small.
 pub fn is_beyond_tolerance(factor: f64, sigma: f64) -> bool {
     factor.abs().ln().abs() > (CARELESS * sigma).clamp(WIDEST_TOLERANCE, NEXT_RANGE.ln())
 }

@@ -7,7 +7,7 @@ use crate::number::three_digits;
 use crate::run::Run;
 use crate::units::{DEGREE, STANDARD_GRAVITY};
 
-/// Halfway to the sensitivity of the next range (which differs by a factor of two).
+/// Halfway, in the logarithm, to the sensitivity of the next measuring range, which differs by a factor of two.
 pub const NEXT_RANGE: f64 = std::f64::consts::SQRT_2;
 
 /// A triad, or one axis of it, with a sensitivity different from the stated one.
@@ -17,7 +17,7 @@ pub struct Sensitivity {
     pub sensor: Sensor,
     /// The axes.
     pub axes: Axes,
-    /// Factors relative to the stated sensitivity: the most likely, and others that are hardly less likely.
+    /// Factors relative to the stated sensitivity: the most likely factor, and others that are hardly less likely.
     pub factors: Vec<f64>,
     /// Quantity of its rows, if a file states it.
     output: Option<Output>,
@@ -25,7 +25,7 @@ pub struct Sensitivity {
     unit: String,
 }
 
-/// All axes of a triad, or one.
+/// All axes of a triad, or one axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Axes {
     /// All three axes.
@@ -35,7 +35,7 @@ pub enum Axes {
 }
 
 impl Axes {
-    /// The triad, then each axis.
+    /// The possible cases: the whole triad, then each axis.
     pub const ALL: [Self; 4] = [Self::All, Self::One(0), Self::One(1), Self::One(2)];
 }
 
@@ -109,7 +109,7 @@ impl fmt::Display for Sensitivity {
             )?,
             Sensor::Accel => write!(
                 f,
-                "{} {measure} gravity as {} m/s² at rest, {times} times the true value",
+                "{} {measure} gravity at rest as {} m/s², {times} times the true value",
                 self.named("the accelerometers"),
                 three_digits(factor * STANDARD_GRAVITY)
             )?,
@@ -120,7 +120,7 @@ impl fmt::Display for Sensitivity {
             let others: Vec<String> = others.iter().map(|&other| three_digits(other)).collect();
             write!(
                 f,
-                " (a factor of {} is almost equally likely)",
+                " (a factor of {} is almost equally probable)",
                 others.join(", ")
             )?;
         }

@@ -13,7 +13,7 @@ use crate::units::DEGREE;
 /// An axis order in `run.toml` that the motion contradicts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mounting {
-    /// The correct order of the outputs of each triad, along right-front-up.
+    /// The correct order of the outputs of each triad, along the right, front and up axes.
     pub orders: PerSensor<AxisOrder>,
     /// Short description of the source of the evidence.
     pub known_from: &'static str,
@@ -21,12 +21,12 @@ pub struct Mounting {
     pub log_ratio: f64,
     /// The corrected line for `run.toml`.
     pub line: String,
-    /// Lines for other axis orders that the recording cannot separate from this order.
+    /// Lines for other axis orders that the recording cannot distinguish from this order.
     pub others: Vec<String>,
     /// Whether a latitude of opposite sign would explain the motion equally well.
     pub or_latitude: bool,
-    /// Triads whose `[imu.prior]` has values that differ between axes, or biases that change sign with a reversed
-    /// column.
+    /// Triads whose `[imu.prior]` contains values that differ between axes, or biases whose sign changes if a column is
+    /// reversed.
     pub prior_differs: Vec<Sensor>,
 }
 
@@ -34,7 +34,8 @@ impl fmt::Display for Mounting {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "the axes in run.toml are wrong: {} (e^{:.0} times more likely, from {}). In [imu] of run.toml write\n  {}",
+            "the axes in run.toml are wrong: {} (e^{:.0} times more likely, from {}). In [imu] of run.toml, \
+             write\n  {}",
             said(&self.orders),
             self.log_ratio,
             self.known_from,
@@ -43,7 +44,7 @@ impl fmt::Display for Mounting {
         if !self.others.is_empty() {
             write!(
                 f,
-                "\nThis recording cannot separate these axes from\n  {}",
+                "\nThis recording cannot distinguish these axes from\n  {}",
                 self.others.join("\n  ")
             )?;
         }
@@ -53,8 +54,8 @@ impl fmt::Display for Mounting {
         for sensor in &self.prior_differs {
             write!(
                 f,
-                "\n[imu.prior.{}] refers to the columns in the new order and sign. If scale and bias are those of the \
-                 columns, rearrange them as well.",
+                "\n[imu.prior.{}] refers to the columns in their new order and with their new signs. If scale and \
+                 bias were given for the individual columns, rearrange them in the same way.",
                 sensor.name()
             )?;
         }
@@ -161,7 +162,7 @@ fn made() -> NamedColumns {
     }
 }
 
-/// Triads whose prior would have to follow the columns.
+/// Triads whose prior must be rearranged together with the columns.
 pub fn prior_differs(run: &Run, orders: &PerSensor<AxisOrder>) -> Vec<Sensor> {
     let differs = |&sensor: &Sensor| {
         let order = orders.get(sensor);

@@ -1,4 +1,4 @@
-//! One way to fill a hole, and its error on intact stretches.
+//! One way to fill a hole, with its error on intact stretches.
 
 use std::ops::Range;
 
@@ -120,8 +120,8 @@ impl Fill {
         of_side(-1).chain(of_side(1)).collect()
     }
 
-    /// Mean square error of the sum over nearby intact stretches, of the even and of the odd ones; `None` if the
-    /// first exceeds `most`.
+    /// Mean square errors of the sum over nearby intact stretches, separately for the even and the odd stretches;
+    /// `None` if the first exceeds `most`.
     pub fn measured(&self, axis: &[f64], most: f64) -> Option<[f64; 2]> {
         let count = self.shifts.len();
         let change = self.change(axis, 0).abs();

@@ -1,5 +1,5 @@
-//! Samples at an end of an axis' range. Signs of an end are: the end of a register, a common value of several spikes, and
-//! repeated values that noise or continued motion would not give.
+//! Detection of samples at an end of the range of an axis. The signs of an end are the end of a register, a value that
+//! several spikes have in common, and repeated values that noise or continued motion would not give.
 
 use std::ops::Range;
 
@@ -11,7 +11,7 @@ use crate::statistics::median;
 /// most one of 2¹⁵ columns; the ends of shorter registers are ordinary values.
 const BITS: [i32; 3] = [16, 24, 32];
 
-/// Rows of an axis with values at the end of its range, or beyond.
+/// Rows in which the value of an axis is at the end of its range or beyond.
 pub fn saturated(
     triad: [&Axis; 3],
     axis: usize,

@@ -8,11 +8,11 @@ use std::path::{Path, PathBuf};
 
 use turncal_input::small_file;
 
-/// The list's name in its directory.
+/// Name of the list file in its directory.
 pub const FILE: &str = ".turncal";
 
-const FIRST_LINE: &str = "turncal-output/1: turncal wrote the files listed here; --force replaces this directory \
-    only if it contains nothing else";
+const FIRST_LINE: &str = "turncal-output/1: turncal wrote the files listed here; --force replaces this directory only \
+if it contains no files other than these";
 
 /// The list of all entries of a directory.
 pub fn of_all(directory: &Path) -> io::Result<String> {
@@ -24,7 +24,8 @@ pub fn of_all(directory: &Path) -> io::Result<String> {
     Ok(of_names(names.iter().map(String::as_str)))
 }
 
-/// Text of the list of a growing directory with these entries. Entries that end in `/` have their own list.
+/// Text of the list for a growing directory with these entries. Entries that end in `/` are directories with their own
+/// list.
 pub fn of_names<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
     let lines = std::iter::once(FIRST_LINE).chain(names);
     lines.flat_map(|line| [line, "\n"]).collect()

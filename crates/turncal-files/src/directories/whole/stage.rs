@@ -35,18 +35,18 @@ pub fn unwritable(target: &Path, doing: &str, error: &io::Error) -> FileError {
     FileError::io(target, doing, error, advice)
 }
 
-/// Unfinished outputs of this process, for the thread that ends the process on a signal.
+/// List of the unfinished outputs of this process, used by the thread that ends the process on a signal.
 pub struct Unfinished(Receiver<Beside>);
 
 impl Unfinished {
-    /// Collects unfinished outputs from here on; `None` if another thread already does so.
+    /// Starts to collect unfinished outputs; `None` if another thread already does so.
     pub fn of_this_process() -> Option<Self> {
         let (announced, all) = channel();
         ANNOUNCED.set(announced).ok().map(|()| Self(all))
     }
 
     /// Removes the unfinished outputs, for a process that is about to end. Threads that start, finish or abandon an
-    /// output from here on wait for that end.
+    /// output after this call wait until the process has ended.
     pub fn abandon(self) {
         ENDING.store(true, Ordering::SeqCst);
         for beside in self.0.try_iter() {
@@ -166,7 +166,7 @@ impl Stage {
         };
         if exists && fs::rename(&old, &self.target).is_err() {
             let stage = self.beside.stage.display();
-            let doing = format!("put the output in place (the old output is in {stage})");
+            let doing = format!("put the output in its place (the old output is in {stage})");
             let advice = "Move it back by hand.";
             return Err(FileError::io(&self.target, &doing, &error, advice));
         }

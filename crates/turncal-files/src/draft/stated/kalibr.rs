@@ -1,4 +1,4 @@
-//! Noise figures of Kalibr's `imu.yaml`.
+//! Noise figures from Kalibr's `imu.yaml`.
 //!
 //! Source: Kalibr, *IMU Noise Model* (wiki): densities of white noise and of the random walk of the bias, in SI.
 
@@ -25,9 +25,10 @@ impl KalibrImu {
     /// Reads the lines `key: value` of one IMU; keys unrelated to noise are ignored.
     ///
     /// # Errors
-    /// [`FileError`] if the file cannot be read, lacks a noise density, or states a wrong number or a key twice.
+    /// Returns [`FileError`] if the file cannot be read, lacks a noise density, or states a wrong number or a key
+    /// twice.
     pub fn read(path: &Path) -> Result<Self, FileError> {
-        let advice = "Correct the name or add the file.";
+        let advice = "Correct the name, or create the file.";
         let text = small_file::text(path, "the noise figures", advice)?;
         Self::of_text(path, &text)
     }

@@ -1,4 +1,4 @@
-//! Facts that a user states about a log in options.
+//! Facts about a log that the user states in options.
 
 mod kalibr;
 
@@ -16,10 +16,10 @@ use turncal::units::DEGREE;
 use turncal_input::{FileError, choice, stated_gravity_sigma, suggestion};
 use turncal_logs::{DataFile, Table};
 
-/// User statements about a log without a `run.toml`; other fields are detected or have a wide prior.
+/// User information about a log without a `run.toml`; other fields are detected or have a wide prior.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Stated {
-    /// The accelerometer file, if the log contains only the gyros.
+    /// The accelerometer file, if the log contains only gyro data.
     pub accel_file: Option<DataFile>,
     /// Columns, by name.
     pub columns: StatedColumns,
@@ -37,17 +37,17 @@ pub struct Stated {
     pub accel_unit: Option<StatedUnit>,
     /// Noise figures.
     pub noise: Option<PerSensor<Noise>>,
-    /// Tolerances of the instrument as delivered.
+    /// Tolerances of the instrument as it was delivered.
     pub tolerances: Option<Tolerances>,
 }
 
 /// Errors in reading a data sheet.
 #[derive(Debug, thiserror::Error)]
 pub enum DataSheetError {
-    /// A sensor could not be read.
+    /// The sensor could not be read.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// A file of noise figures could not be read.
+    /// The file of noise figures could not be read.
     #[error(transparent)]
     File(#[from] FileError),
 }
@@ -59,7 +59,7 @@ impl Stated {
         Sensor::ALL.into_iter().filter_map(of)
     }
 
-    /// The site, with a wide σ for every value that is not stated.
+    /// The site; every value that is not stated has a wide σ.
     pub fn site(&self) -> Site {
         let latitude = self.latitude_deg.map(|degrees| degrees * DEGREE);
         let site = Site::of_knowledge(latitude, 0.0, self.height_m);
@@ -72,10 +72,10 @@ impl Stated {
     }
 
     /// Adds noise and tolerances of a sensor, by its name or file, and the figures of a Kalibr `imu.yaml`, which
-    /// override those of the sensor. A stated rate is kept.
+    /// override those of the sensor. If a rate was already stated, it is kept.
     ///
     /// # Errors
-    /// [`DataSheetError`] if the sensor or the file cannot be read.
+    /// Returns [`DataSheetError`] if the sensor or the file cannot be read.
     pub fn with_data_sheets(
         self,
         sensor: Option<&str>,
@@ -94,10 +94,10 @@ impl Stated {
     }
 }
 
-/// Columns of a table stated by the user; the others are detected.
+/// Columns of a table that the user stated; the other columns are detected.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct StatedColumns {
-    /// Columns of each triad along right, front and up.
+    /// Columns of each triad along the right, front and up axes.
     pub triads: PerSensor<Option<[String; 3]>>,
     /// Time.
     pub time: Option<String>,
@@ -127,7 +127,7 @@ impl StatedColumns {
 pub struct StatedUnit(pub Unit);
 
 impl StatedUnit {
-    /// Parses the unit for the triad of this sensor.
+    /// Parses the unit for the triad of a sensor.
     ///
     /// # Errors The list of accepted units, if the text is not one of them.
     pub fn parse(sensor: Sensor, text: &str) -> Result<Self, String> {

@@ -76,7 +76,7 @@ fn a_turn_within_two_rows_is_no_cut_if_gyros_show_it() {
     };
     has(
         &drafted(&laid_end_to_end.rows()),
-        &["continuous = false  # gravity direction jumps in 4 places"],
+        &["continuous = false  # the gravity direction jumps in 4 places"],
     );
 }
 
@@ -109,7 +109,7 @@ fn without_a_time_turns_tell_the_unit_that_has_a_usual_rate() {
         &text,
         &[
             why,
-            "# no column rises steadily, as times do; the sample period is estimated from the turns",
+            "# no column increases steadily, as a time does; turncal estimates the sample period from the turns",
         ],
     );
     let rate = text.split(why).nth(1).unwrap().split(' ').next().unwrap();
@@ -127,7 +127,9 @@ fn one_rough_turn_and_none_are_told_apart() {
     let never = &rows[..200].to_vec();
     has(
         &drafted(never),
-        &["# gyro_unit =  # TODO: gravity direction does not change, so it cannot be estimated"],
+        &[
+            "# gyro_unit =  # TODO: the gravity direction does not change, so the unit cannot be estimated",
+        ],
     );
     // A hand that shakes as it turns.
     for row in rows.iter_mut().skip(200).step_by(2).take(50) {
@@ -137,6 +139,6 @@ fn one_rough_turn_and_none_are_told_apart() {
     rows.truncate(500);
     has(
         &drafted(&rows),
-        &["# gyro_unit =  # TODO: too few usable turns of gravity to estimate it"],
+        &["# gyro_unit =  # TODO: there are too few usable turns to estimate the unit"],
     );
 }

@@ -1,8 +1,8 @@
-//! Least squares of the change of a specific force by turns.
+//! Least-squares fit of the change of specific force caused by turns.
 
 use nalgebra::{SMatrix, SVector};
 
-/// Places of three columns.
+/// Indices of three columns.
 pub type Triad = [usize; 3];
 
 /// One, f, w and the products of f and w.
@@ -10,12 +10,12 @@ const TERMS: usize = 16;
 /// Factor s, s w₀, s c and s w₀ × c.
 const UNKNOWNS: usize = 10;
 
-/// The gyro axes that turn x, y and z, and their signs; of opposite orders one.
+/// All orders of the gyro axes about x, y and z, with their signs. Of two opposite orders, only one is included.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Order([(usize, f64); 3]);
 
 impl Order {
-    /// The order as written first.
+    /// The first order is that in which the columns are written.
     pub fn all() -> impl Iterator<Item = Self> {
         let orders = [
             [0, 1, 2],
@@ -37,7 +37,7 @@ impl Order {
         self.0 == [(0, 1.0), (1, 1.0), (2, 1.0)]
     }
 
-    /// These columns in this order.
+    /// Returns these columns in this order.
     pub fn of(&self, triad: &Triad) -> [(usize, f64); 3] {
         self.0.map(|(axis, sign)| (triad[axis], sign))
     }
@@ -60,21 +60,22 @@ impl Order {
     }
 }
 
-/// Sums over windows of products of the terms, and of terms and changes.
+/// Sums, over all windows, of the products of the terms with each other and with the changes.
 pub struct Moments {
     terms: SMatrix<f64, TERMS, TERMS>,
     changes: [SVector<f64, TERMS>; 3],
     squares: [f64; 3],
 }
 
-/// Remaining fractions of the squares of the changes.
+/// Remaining fractions of the squared changes after the fit.
 pub struct Ratios {
     pub of_axes: [f64; 3],
     pub of_all: f64,
 }
 
 impl Moments {
-    /// From the means of columns in windows and in their next ones; `None` if both triads have too few.
+    /// Computes the sums from the means of the columns in each window and in the next one; `None` if both triads have
+    /// too few windows.
     pub fn new(means: &[Vec<f64>], windows: &[usize], gyro: Triad, accel: Triad) -> Option<Self> {
         let scale = |triad: Triad| {
             let values = triad
@@ -116,7 +117,7 @@ impl Moments {
         (3 * count > UNKNOWNS && found.squares.iter().all(|of| *of > 0.0)).then_some(found)
     }
 
-    /// The fractions that turns in this order do not explain.
+    /// The fractions of the squared changes that turns with this order of axes do not explain.
     pub fn ratios(&self, order: &Order) -> Option<Ratios> {
         let mut normal = SMatrix::<f64, UNKNOWNS, UNKNOWNS>::zeros();
         let mut right = SVector::<f64, UNKNOWNS>::zeros();

@@ -1,4 +1,4 @@
-//! Sizes of counts, stated or measured.
+//! The size of a count, either stated or measured.
 
 use crate::draft::motion::TOLERANCE;
 use crate::draft::name::Unit;
@@ -18,13 +18,13 @@ const PER_DEGREE: [f64; 17] = [
 pub struct Scale {
     /// The file's quantity per second for one rad/s or m/s².
     pub value: f64,
-    /// Relative uncertainty from the recording.
+    /// Relative uncertainty of the value from the recording.
     pub off: f64,
     pub why: String,
 }
 
 impl Scale {
-    /// Size of a named unit that is a multiple of a unit of `run.toml`.
+    /// Size of a count for a named unit that is a multiple of a unit of `run.toml`.
     pub fn of_unit(sensor: Sensor, unit: Unit) -> Option<Self> {
         let of_one = unit_scale(sensor, unit.word).filter(|_| unit.times != 1.0)?;
         let times = rounded(unit.times, 4);
@@ -35,14 +35,14 @@ impl Scale {
         })
     }
 
-    /// Size from the magnitude at rest, in counts per g, if the zero is the nominal one.
+    /// Size of a count, in counts per g, from the magnitude of gravity at rest, assuming that the zero is nominal.
     pub fn of_gravity(per_g: f64) -> Self {
         let sheet = [2f64.powf(per_g.log2().round())];
-        let by = "the magnitude of gravity at rest, if the zero offset is zero";
+        let by = "the magnitude of gravity at rest, assuming that the zero offset is zero";
         Self::measured(per_g, ("g", STANDARD_GRAVITY), &sheet, by)
     }
 
-    /// Size from turns, in rows per rad: counts per rad/s, or per rad for increments.
+    /// Size of a count from turns: counts per rad/s or, for increments, counts per rad.
     pub fn of_turns(per_rad: f64, output: Output) -> Self {
         // The size of a pulse is specific to each instrument.
         let sheet = match output {
@@ -67,7 +67,9 @@ impl Scale {
             None => Self {
                 value: measured / one,
                 off: 2.0 * TOLERANCE,
-                why: format!("{measured} counts per {of}, from {by}; prefer the data-sheet value"),
+                why: format!(
+                    "{measured} counts per {of}, estimated from {by}; prefer the value in the data sheet"
+                ),
             },
         }
     }

@@ -1,4 +1,4 @@
-//! A possible unit of rows, and the evidence of gravity at rest and turns.
+//! A possible unit of the rows, with the evidence from gravity at rest and from turns.
 
 use crate::draft::motion::Motion;
 use crate::draft::name::Unit;
@@ -6,7 +6,7 @@ use turncal::imu::{Output, PerSensor, Sensor};
 use turncal::number::rounded;
 use turncal::units::STANDARD_GRAVITY;
 
-/// Factor by which turns tell rates and units of gyros apart.
+/// Turns can distinguish two gyro rates or units that differ by this factor.
 pub const TURNS_TOLD_APART: f64 = 1.3;
 /// Gravity at rest and turns distinguish units that differ by more than this factor, because raw sensors may be off by
 /// tenths.
@@ -18,9 +18,9 @@ const TOLD_APART: PerSensor<f64> = PerSensor {
 /// The rows of a triad.
 pub struct TriadRows<'a> {
     pub motion: &'a Motion,
-    /// Period in s; NaN if unknown.
+    /// Sample period in s; NaN if unknown.
     pub period: f64,
-    /// Whether the period is stated, not derived from times.
+    /// Whether the period is stated and not derived from times.
     pub is_stated: bool,
     /// Unit named in the file.
     pub named: Option<Unit>,
@@ -39,7 +39,7 @@ pub struct Hypothesis {
 }
 
 impl Hypothesis {
-    /// A unit by its name and its number per SI unit (rad/s or m/s²).
+    /// A unit: its name, and the number of these units in one SI unit (rad/s or m/s²).
     pub fn new(
         sensor: Sensor,
         (word, per_si): (&'static str, f64),
@@ -78,12 +78,14 @@ impl Hypothesis {
         };
         match (sensor, self.fits()) {
             (Sensor::Accel, true) => format!("{} at rest", rounded(motion.gravity, 4)),
-            (Sensor::Accel, false) => format!("magnitude at rest is {factor} times gravity"),
+            (Sensor::Accel, false) => {
+                format!("the magnitude of the specific force at rest is {factor} times gravity")
+            }
             (Sensor::Gyro, true) => {
                 "integrated gyro angles match the change of gravity direction".to_owned()
             }
             (Sensor::Gyro, false) => {
-                format!("gravity direction changes by {factor} times the integrated gyro angle")
+                format!("the gravity direction changes by {factor} times the integrated gyro angle")
             }
         }
     }

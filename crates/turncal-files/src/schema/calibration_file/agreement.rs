@@ -1,4 +1,4 @@
-//! Fields of a calibration that follow from each other: a file in which they disagree was edited or damaged.
+//! Fields of a calibration that follow from each other: if they disagree, the file was edited or damaged.
 
 use std::iter::zip;
 
@@ -12,7 +12,7 @@ use turncal::calibration::{
 use turncal::imu::Sensor;
 use turncal_input::counted;
 
-/// An error: content found and content expected.
+/// An error, with the content found and the content expected.
 pub type Wrong = (String, String);
 /// Outcome of a check.
 pub type Checked = Result<(), Wrong>;
@@ -86,7 +86,7 @@ fn check_budget(record: &Calibration, budget: &BudgetRecord) -> Checked {
         let (sum, variance) = (squares().sum::<f64>(), record.covariance[n][n]);
         expect!(
             is_near(sum, variance, BUDGET),
-            "equal values, because the squares of a budget add up to the variance",
+            "equal values, because the sum of the squares in a budget is the variance",
             "the sum of u² in budget.sources for {name} = {sum:e}, but its variance in covariance = {variance:e}"
         );
         let freedom = |part: &BudgetPartRecord| part.degrees_of_freedom.unwrap_or(f64::INFINITY);
@@ -98,14 +98,14 @@ fn check_budget(record: &Calibration, budget: &BudgetRecord) -> Checked {
         expect!(
             is_near(of_parts, stated, BUDGET),
             format!(
-                "{of_parts:.6}, from the degrees of freedom in budget.sources (Welch and Satterthwaite)"
+                "{of_parts:.6}, computed from the degrees of freedom in budget.sources (Welch and Satterthwaite)"
             ),
             "budget.degrees_of_freedom of {name} = {stated}"
         );
         let (k, expected) = (budget.coverage_factor[n], coverage_factor(stated));
         expect!(
             is_near(k, expected, RELATIVE),
-            format!("{expected:.6}, from budget.degrees_of_freedom"),
+            format!("{expected:.6}, computed from budget.degrees_of_freedom"),
             "budget.coverage_factor of {name} = {k}"
         );
     }
@@ -159,8 +159,8 @@ fn check_nis(record: &Calibration, consistency: &ConsistencyRecord) -> Checked {
         let [_, end] = nis_interval;
         expect!(
             is_told || *nis <= 1.0 + BEYOND * (end - 1.0),
-            "finding W10 or W03 for a NIS beyond its limit",
-            "consistency: NIS ({name}) = {nis}, upper end of nis_interval = {end}, and no finding about it"
+            "finding W10 or W03, which reports a NIS beyond its limit",
+            "consistency: NIS ({name}) = {nis} and upper end of nis_interval = {end}, without a finding about this"
         );
     }
     Ok(())

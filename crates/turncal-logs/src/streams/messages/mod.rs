@@ -1,4 +1,4 @@
-//! Topics of a log: each contains messages of one type with their log times.
+//! The topics of a log. Each topic contains messages of one type with their log times.
 
 pub mod json;
 pub mod packed;
@@ -126,7 +126,9 @@ impl Reader {
     pub fn of_ros(name: &str, definition: &str, encoding: Encoding) -> Self {
         match ros::Message::parse(name, definition, encoding) {
             Ok(message) => Self::Ros(message),
-            Err(wrong) => Self::Unknown(format!("turncal cannot read its definition ({wrong})")),
+            Err(wrong) => Self::Unknown(format!(
+                "turncal cannot read the message definition ({wrong})"
+            )),
         }
     }
 

@@ -133,7 +133,10 @@ fn where_device_or_parameters_change_each_sample_is_undone_by_its_own_and_all_ar
     ];
     let (offsets, remarks) = undone(&devices);
     assert_eq!(offsets, [1.0, 2.0, 0.0]);
-    for (n, words) in ["GYRO0", "GYRO1", "used unchanged"].iter().enumerate() {
+    for (n, words) in ["GYRO0", "GYRO1", "used the values unchanged"]
+        .iter()
+        .enumerate()
+    {
         let is_of_part = remarks[n].starts_with("For part of the samples: ");
         assert!(is_of_part && remarks[n].contains(words), "{remarks:?}");
     }

@@ -21,7 +21,7 @@ pub struct Parameters {
 }
 
 impl Parameters {
-    /// A state without parameters so far, with these selected devices.
+    /// A state with these selected devices and, so far, no parameters.
     pub fn of(selected: PerSensor<Option<f64>>) -> Self {
         Self {
             selected,
@@ -66,7 +66,7 @@ impl Parameters {
         self.values.get(name).copied()
     }
 
-    /// Corrections applied to the device with this number, otherwise to the selected or only one.
+    /// Corrections applied to the device with this number; if the number is unknown, to the selected or only device.
     pub fn applied(&self, sensor: Sensor, device: Option<f64>) -> Option<Applied> {
         let device = device.or(*self.selected.get(sensor));
         let (kind, temperature) = sensor.pick(("GYRO", "TC_G_ENABLE"), ("ACC", "TC_A_ENABLE"));

@@ -1,4 +1,4 @@
-//! A calibration certificate: a document, and the content of every page margin.
+//! A calibration certificate: the document and the content of the page margins.
 
 mod results;
 
@@ -18,7 +18,7 @@ use turncal::imu::ParameterKind;
 use turncal::laboratory::{Authorised, Condition, Contact};
 use turncal::run::Aiding;
 
-/// Files of a certificate: PDF, XML and the calibration; the latter two are also embedded in the PDF.
+/// Files of a certificate: PDF, XML and the calibration; the XML file and the calibration are also embedded in the PDF.
 ///
 /// # Errors [`PdfError`] if a text cannot be shown.
 pub fn files(
@@ -193,13 +193,13 @@ fn method(certificate: &Certificate) -> Facts {
 fn evaluation(aiding: Option<Aiding>) -> &'static str {
     match aiding {
         Some(Aiding::Table) => {
-            "error-state Kalman filter with Gauss–Newton iterations, observing standstill and the attitude of the \
-             turntable"
+            "error-state Kalman filter with Gauss–Newton iterations, which observes standstill and the attitude of \
+             the turntable"
         }
         Some(Aiding::Velocity) => {
-            "error-state Kalman filter with Gauss–Newton iterations, observing standstill"
+            "error-state Kalman filter with Gauss–Newton iterations, which observes standstill"
         }
-        None => "closed form from static positions",
+        None => "closed form with static positions",
     }
 }
 
@@ -247,7 +247,7 @@ fn verdict(conformity: &Conformity) -> String {
     );
     if !conformity.not_decided.is_empty() {
         text += &format!(
-            " Not decided because not calibrated: {}.",
+            " Not decided, because these parameters were not calibrated: {}.",
             conformity.not_decided.join(", ")
         );
     }
@@ -290,8 +290,8 @@ fn limits(conformity: &Conformity) -> Table {
     Table::new("Conformity with the specification", columns("parameter | value ± U | limits | unit | decision | risk"))
         .section(rows)
         .note(
-            "In the general installation form; U with the k of the results. Risk: probability, given this calibration, that the decision is wrong \
-             (false acceptance or false rejection; JCGM 106, 9.3).",
+            "Values are in the general installation form; U uses the same k as the results. Risk: probability, given this \
+             calibration, that the decision is wrong (false acceptance or false rejection; JCGM 106, 9.3).",
         )
 }
 
@@ -322,9 +322,10 @@ fn found(as_found: &AsFound) -> Table {
     });
     let columns = columns("parameter | as found ± U | as left ± U | change ± U | unit | change/U");
     Table::new("As found and as left", columns).section(rows).note(format!(
-        "As found: parameters from {}, valid when the item was received; as left: parameters from this calibration, in \
-         the general installation form. U of a change: root sum of squares of the two U. A change beyond its U \
-         shows that the item has drifted. Body frame of both: {}.",
+        "As found: parameters from {}, which was valid when the item was received. As left: parameters from this \
+         calibration. Both sets of parameters are in the general installation form. U of a change: root sum of \
+         squares of both expanded uncertainties. A change larger than its U shows that the item has drifted. Body \
+         frame of both calibrations: {}.",
         as_found.earlier,
         as_found.body_frame.words()
     ))

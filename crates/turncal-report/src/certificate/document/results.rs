@@ -5,7 +5,7 @@ use crate::prelude::*;
 use turncal::calibration::Group;
 use turncal::imu::{Sensor, Term};
 
-/// A value and its U rounded as required by EA-4/02, 6.3: U to two digits, the value to the same place.
+/// A value and its U, rounded as EA-4/02, 6.3, requires: U to two digits, and the value to the same decimal place.
 pub fn two_digits(of: f64, expanded: f64) -> (f64, f64) {
     let place = 10f64.powf((expanded.log10() - 1.0).floor());
     if place > 1.0 {
@@ -18,7 +18,7 @@ pub fn two_digits(of: f64, expanded: f64) -> (f64, f64) {
     }
 }
 
-/// Every parameter with its expanded uncertainty, and their definitions.
+/// Every parameter with its expanded uncertainty, and the definitions of parameter and uncertainty.
 pub fn results(certificate: &Certificate) -> Table {
     let has_budget = certificate.calibration.budget.is_some();
     let row = |of: &Measured| {
@@ -50,7 +50,7 @@ pub fn results(certificate: &Certificate) -> Table {
         of_term.map(row).collect::<Vec<_>>()
     });
     let budget = if has_budget {
-        ", and calibration.json contains their uncertainty budget"
+        ", and calibration.json contains the uncertainty budget of the results"
     } else {
         ""
     };
@@ -65,9 +65,8 @@ pub fn results(certificate: &Certificate) -> Table {
         ))
         .note(format!(
             "U: expanded uncertainty, the standard uncertainty times the coverage factor k for a coverage probability \
-             of 95.45 % (JCGM 100); ν: effective degrees of freedom, – where not evaluated. The results are \
-             correlated; both attached files contain the covariance matrix of scale factors, misalignments and \
-             biases{budget}.",
+             of 95.45 % (JCGM 100); ν: effective degrees of freedom (– if not evaluated). The results are correlated; \
+             both attached files contain the covariance matrix of scale factors, misalignments and biases{budget}.",
         ));
     if certificate.terms.is_empty() {
         table

@@ -39,12 +39,12 @@ pub enum Many {
     One,
     /// A fixed number.
     Fixed(usize),
-    /// A number stated in the message.
+    /// A number that each message states.
     Any,
 }
 
 impl Many {
-    /// Whether its numbers become columns.
+    /// Whether the numbers of the field become columns.
     pub fn is_column(self) -> bool {
         match self {
             Self::One => true,
@@ -54,7 +54,7 @@ impl Many {
     }
 }
 
-/// Definitions while a type is built.
+/// The definitions used while a type is built.
 pub struct Parser {
     /// Names and texts; the first is that of the message.
     definitions: Vec<(String, String)>,
@@ -68,7 +68,7 @@ pub struct Parser {
 struct Place<'a> {
     path: &'a str,
     many: Many,
-    /// Whether its numbers become columns.
+    /// Whether the numbers of the field become columns.
     is_column: bool,
     depth: usize,
 }

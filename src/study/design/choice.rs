@@ -1,0 +1,121 @@
+//! The choice among paths by their exact σ.
+
+use rayon::prelude::*;
+
+use super::goal::Goals;
+use super::legs::Legs;
+use super::search::{SHORTEST_DWELL, Search};
+use super::turn::Turn;
+use super::{DesignStudy, TURN, USUAL_TIME, along, expected};
+use crate::calibration::Estimate;
+use crate::study::path::PathError;
+
+/// Numbers of turns in the usual time among which the dwells of a first path are chosen.
+const TURNS: [f64; 3] = [14.0, 22.0, 32.0];
+/// Number of corrections of the dwells, because the goals are for σ of joined legs.
+const CORRECTIONS: usize = 6;
+/// Smallest difference between dwells, s.
+const HUNDREDTH: f64 = 0.01;
+/// Largest σ over the σ that decides a limit, with a margin for dwells in hundredths of a second.
+const DECIDED: f64 = 0.998;
+
+/// A candidate with its exact σ.
+pub struct Candidate {
+    pub turns: Vec<Turn>,
+    pub dwell: f64,
+    estimate: Estimate,
+}
+
+impl DesignStudy {
+    /// The best path found, with its dwells.
+    pub(super) fn best(
+        &self,
+        legs: &mut Legs,
+        goals: &Goals,
+        time: f64,
+    ) -> Result<Candidate, PathError> {
+        let decide = self.specification.is_some();
+        let mut search = Search::new(legs, goals.clone(), time);
+        let mut first = Vec::new();
+        for turns in TURNS {
+            let dwell = (time.min(USUAL_TIME) / turns - TURN).max(SHORTEST_DWELL);
+            let turns = search.greedy(dwell, decide)?;
+            let dwell = if decide { dwell } else { search.dwell(&turns) };
+            first.push((turns, dwell));
+        }
+        let first = first.into_par_iter().map(|(turns, dwell)| {
+            let candidate = search.legs.candidate(turns, dwell)?;
+            self.fitted(&search, goals, candidate)
+        });
+        let first: Vec<Candidate> = first.collect::<Result<_, _>>()?;
+        let by_cost = |a: &Candidate, b: &Candidate| {
+            let [a, b] = [a, b].map(|of| self.cost(&search, goals, of));
+            a.total_cmp(&b)
+        };
+        let Some(first) = first.into_iter().min_by(by_cost) else {
+            return search.legs.candidate(Vec::new(), time);
+        };
+        if let Some(joined) = search.legs.sigma(&first.turns, first.dwell) {
+            search.goals = goals.corrected(&joined, &first.estimate.sigma());
+        }
+        search.time = search.duration(&first.turns, first.dwell);
+        let turns = search.exchange(first.turns.clone())?;
+        let exchanged = search.legs.candidate(turns.clone(), search.dwell(&turns))?;
+        search.time = time;
+        let exchanged = self.fitted(&search, goals, exchanged)?;
+        Ok(std::cmp::min_by(exchanged, first, |a, b| {
+            let [a, b] = [a, b].map(|of| self.cost(&search, goals, of));
+            a.total_cmp(&b)
+        }))
+    }
+
+    /// What is to be small: the time if limits are decided, otherwise σ.
+    fn cost(&self, search: &Search, goals: &Goals, of: &Candidate) -> f64 {
+        let cost = goals.cost(&of.estimate.sigma());
+        let is_decided = goals.worst(&of.estimate.sigma()) <= DECIDED;
+        match self.specification {
+            Some(_) if is_decided => search.duration(&of.turns, of.dwell) / search.time - 2.0,
+            _ => cost,
+        }
+    }
+
+    /// With limits: the candidate with the shortest dwells that decide them, within the time.
+    fn fitted(
+        &self,
+        search: &Search,
+        goals: &Goals,
+        mut candidate: Candidate,
+    ) -> Result<Candidate, PathError> {
+        if self.specification.is_none() {
+            return Ok(candidate);
+        }
+        let longest = search.dwell(&candidate.turns);
+        let mut decided: Option<Candidate> = None;
+        for _ in 0..CORRECTIONS {
+            let worst = goals.worst(&candidate.estimate.sigma());
+            // σ decrease with the root of the time, or more slowly.
+            let dwell = candidate.dwell * (worst * worst * 1.01).clamp(0.3, 3.0);
+            let dwell = dwell.clamp(SHORTEST_DWELL.min(longest), longest);
+            let turns = candidate.turns.clone();
+            if worst <= DECIDED && decided.as_ref().is_none_or(|of| candidate.dwell < of.dwell) {
+                decided = Some(candidate);
+            } else if (dwell - candidate.dwell).abs() < HUNDREDTH {
+                return Ok(decided.unwrap_or(candidate));
+            }
+            candidate = search.legs.candidate(turns, dwell)?;
+        }
+        Ok(decided.unwrap_or(candidate))
+    }
+}
+
+impl Legs<'_> {
+    /// A path with its exact σ.
+    fn candidate(&self, turns: Vec<Turn>, dwell: f64) -> Result<Candidate, PathError> {
+        let path = self.machine.path(&self.machine.start(), &turns, dwell);
+        Ok(Candidate {
+            estimate: expected(&along(&self.study, path)?)?,
+            turns,
+            dwell,
+        })
+    }
+}
