@@ -65,6 +65,7 @@ pub mod earth;
 pub mod imu;
 pub mod laboratory;
 pub mod lot;
+pub mod magnetic;
 pub mod models;
 pub mod navigation;
 pub mod noise;

@@ -1,11 +1,13 @@
 //! The Bayesian Cramér–Rao bound of a run.
 
+use crate::calibration::magnetometer::with_magnetometer;
 use crate::calibration::outcome::{auxiliary_of, last_attitude};
+use crate::calibration::several::Start;
 use crate::calibration::sizes::Effects;
 use crate::calibration::start::coarse::initial_attitudes;
 use crate::calibration::{
-    Auxiliary, CalibrationError, Epoch, ErrorTerm, Estimate, Linearisation, Observability,
-    ParameterVector, Problem, Script,
+    Auxiliary, CalibrationError, Epoch, ErrorTerm, Estimate, Linearisation, MagneticEstimate,
+    Observability, ParameterVector, Problem, Script,
 };
 use crate::imu::{PerSensor, TermVector, Triad};
 
@@ -22,6 +24,8 @@ pub struct Bound {
     pub prior_sigma: ParameterVector,
     /// Combinations of parameters that the recording determines.
     pub observability: Observability,
+    /// The magnetometer, linearised at its start, with the bound as its covariance.
+    pub magnetic: Option<MagneticEstimate>,
 }
 
 /// An error term that a bound does not include.
@@ -83,6 +87,7 @@ pub fn bound_without_moves(
     let bound = Bound {
         observability: Observability::new(&estimate, &prior_sigma, &across),
         auxiliary: auxiliary_of(posterior, &script.at, &problem.model, |_| true),
+        magnetic: MagneticEstimate::new(posterior, &script.at, &problem.model),
         prior_sigma,
         estimate,
         history,
@@ -136,5 +141,11 @@ fn script(problem: &Problem, truth: Linearisation) -> Result<Script, Calibration
         initial_attitudes: attitudes.iter().map(|attitude| attitude.mean).collect(),
         ..truth
     };
-    Script::new(problem, &attitudes, &at)
+    let start = Start {
+        at,
+        priors: attitudes,
+        alone: Vec::new(),
+    };
+    let Start { at, priors, .. } = with_magnetometer(problem, start)?;
+    Script::new(problem, &priors, &at)
 }

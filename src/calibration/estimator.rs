@@ -2,6 +2,7 @@
 
 use crate::calibration::checks::prior_distance::widened;
 use crate::calibration::iterations::solve;
+use crate::calibration::magnetometer::with_magnetometer;
 use crate::calibration::several::start;
 use crate::calibration::{
     CalibrationError, Estimate, Linearisation, Outcome, ParameterMatrix, Problem, Progress, checks,
@@ -17,7 +18,7 @@ use crate::calibration::{
 /// Returns [`CalibrationError`] if the runs cannot give a calibration. Without convergence, the result is an
 /// [`Outcome`] with `converged = false` and a finding.
 pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, CalibrationError> {
-    let start = start(problem)?;
+    let start = with_magnetometer(problem, start(problem)?)?;
     let wide = with_wide_prior(problem, &start.at);
     let solved = solve(&wide, (&start.at, &start.priors), progress)?;
     let mut outcome = Outcome::new((problem, &wide), start.alone, solved)?;

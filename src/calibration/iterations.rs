@@ -130,6 +130,10 @@ fn one_pass(
 fn largest(posterior: &Posterior) -> f64 {
     let variance = posterior.parameter_covariance.diagonal();
     let steps = posterior.parameters.iter().zip(&variance);
+    let magnetic = posterior.constants.iter().enumerate();
+    let magnetic = magnetic.filter(|(_, of)| matches!(of, Constant::Magnetic(_)));
+    let magnetic = magnetic.map(|(k, _)| (&posterior.mean[k], &posterior.covariance[(k, k)]));
+    let steps = steps.chain(magnetic);
     let steps = steps.filter(|(_, variance)| **variance != 0.0);
     steps
         .map(|(step, variance)| (step / variance.sqrt()).abs())
@@ -152,6 +156,7 @@ impl Filtered<'_> {
             match constant {
                 Constant::Term(index) => moved.terms[*index] += error,
                 Constant::Thermal(of) => *of.of_mut(&mut moved.thermal) += error,
+                Constant::Magnetic(k) => moved.magnetic.iter_mut().for_each(|of| of[*k] += error),
                 _ => {}
             }
         }

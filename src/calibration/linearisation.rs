@@ -12,6 +12,7 @@ use crate::imu::{
     PARAMETERS as PER_TRIAD, ParameterKind, PerSensor, Sensor, TermVector, ThermalCoefficients,
     Triad, thermal_state,
 };
+use crate::magnetic::MagneticVector;
 use crate::run::Run;
 use crate::turntable::TableAccuracy;
 use crate::units::DEGREE;
@@ -27,6 +28,8 @@ pub struct Linearisation {
     pub thermal: PerSensor<ThermalCoefficients>,
     /// Deviation of each recording from the common parameters; zero for recordings that are not in the list.
     pub own: Vec<Difference>,
+    /// The magnetometer and its field; `None` if there is none, or if the dwells do not determine it.
+    pub magnetic: Option<MagneticVector>,
     /// `C_b_n` at the first sample of each stretch.
     pub initial_attitudes: Vec<Matrix3<f64>>,
     /// `C_b_n` at the beginning of each dwell, regardless of the table reading; empty in the first pass.
@@ -45,6 +48,7 @@ impl Linearisation {
             terms,
             thermal: PerSensor::default(),
             own: Vec::new(),
+            magnetic: None,
             initial_attitudes,
             dwells: Vec::new(),
         }
@@ -106,6 +110,8 @@ impl Linearisation {
             own: (0..self.own.len().max(other.own.len()))
                 .map(|k| self.own(k).towards(&other.own(k), fraction))
                 .collect(),
+            magnetic: (self.magnetic.zip(other.magnetic))
+                .map(|(from, to)| from + (to - from) * fraction),
             initial_attitudes: turned(&self.initial_attitudes, &other.initial_attitudes),
             dwells: if self.dwells.is_empty() {
                 other.dwells.clone()

@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use crate::calibration::budget::source::BudgetSource;
 use crate::calibration::parameters::{Before, stacked};
 use crate::calibration::record::standstill::FLOOR;
-use crate::calibration::{DayToDay, ErrorTerm, Options, ParameterVector, to_vector};
+use crate::calibration::{DayToDay, ErrorTerm, MagneticPrior, Options, ParameterVector, to_vector};
 use crate::imu::{
     GaussMarkov, InstallationForm, MotionNoise, Noise, PerSensor, Sensor, TermVector, ThermalModel,
 };
@@ -60,6 +60,8 @@ pub struct Model {
     pub thermal: Option<Arc<ThermalModel>>,
     /// σ of the differences between recordings.
     pub day_to_day: DayToDay,
+    /// Prior of the magnetometer and the field at its site, if any.
+    pub magnetic: MagneticPrior,
     /// 1σ of gravity at the site, m/s²; common to all dwells of a recording.
     pub gravity_sigma: f64,
     /// 1σ per axis of the table position error, rad; zero without a table.
@@ -100,6 +102,7 @@ impl Model {
                 && (options.auto_terms || !options.terms.is_empty()),
             thermal: None,
             day_to_day: DayToDay::default(),
+            magnetic: MagneticPrior::new(run),
             gravity_sigma: run.site.gravity_sigma,
             position_sigma: accuracy.position_sigma,
             reading_sigma: accuracy.reading_sigma,

@@ -21,9 +21,9 @@ use crate::calibration::several::SeparateEstimate;
 use crate::calibration::sizes::{LARGEST, Weighed};
 use crate::calibration::{
     AttitudePrior, Auxiliary, CalibrationError, Candidate, Consistency, Constant, Difference,
-    Epoch, Estimate, Finding, FormTest, Innovation, Linearisation, Model, NoiseReport,
-    Observability, ParameterMatrix, ParameterVector, Pass, Posterior, Problem, Thermal, Verdict,
-    Word,
+    Epoch, Estimate, Finding, FormTest, Innovation, Linearisation, MagneticEstimate, Model,
+    NoiseReport, Observability, ParameterMatrix, ParameterVector, Pass, Posterior, Problem,
+    Thermal, Verdict, Word,
 };
 use crate::imu::Sensor;
 
@@ -50,6 +50,8 @@ pub struct Outcome {
     pub own: Vec<Own>,
     /// Separate calibration of each recording, if recordings or temperatures differ.
     pub alone: Vec<SeparateEstimate>,
+    /// The magnetometer and its field, if there is one and the dwells determine it.
+    pub magnetic: Option<MagneticEstimate>,
     /// Gravity and its 1σ after the fit, m/s².
     pub gravity: (f64, f64),
     /// Observability of the parameters in the run.
@@ -132,6 +134,7 @@ impl Outcome {
             auxiliary: auxiliary(&weighed, &solved, &problem.model),
             thermal: posterior.thermal(&script.at, &problem.model),
             own: own(filtered, posterior, &script.at),
+            magnetic: MagneticEstimate::new(posterior, &script.at, &problem.model),
             gravity: (problem.run().site.gravity + off, gravity_sigma),
             terms: TermEvidence::all(&weighed, &effects.candidates, &problem.model),
             events: Event::all(problem, &weighed),

@@ -1,5 +1,6 @@
 //! A calibration problem: preprocessed runs of one instrument, and the model to estimate.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use nalgebra::Matrix3;
@@ -12,7 +13,7 @@ use crate::calibration::record::schedule::{Step, first_reading, steps};
 use crate::calibration::record::standstill::{FLOOR, standstill_sigma};
 use crate::calibration::{AttitudePrior, Model, Observation, Options};
 use crate::imu::{PerSensor, Sensor};
-use crate::recording::{Recording, TableLog};
+use crate::recording::{MagneticMean, MagneticNoise, Recording, TableLog};
 use crate::run::{Aiding, Dwell, LONG_ENOUGH, Run};
 
 /// 1σ of the initial velocity of a body at rest, m/s, in addition to its sway.
@@ -46,6 +47,8 @@ pub struct Stretch<'a> {
     pub steps: Vec<Step>,
     /// White 1σ at standstill, stated in or estimated from the run: attitude in rad, velocity in m/s.
     pub standstill_sigma: PerSensor<f64>,
+    /// Noise of the magnetometer in the dwells, if any.
+    pub magnetic_noise: MagneticNoise,
 }
 
 impl<'a> Problem<'a> {
@@ -277,8 +280,12 @@ impl<'a> Stretch<'a> {
         dwells: Vec<Dwell>,
         standstill_sigma: PerSensor<f64>,
     ) -> Self {
+        let times = |dwell: &Dwell| run.recording.imu.times(&dwell.samples);
+        let noise = (run.recording.magnetometer.as_ref())
+            .map(|magnetometer| magnetometer.noise(dwells.iter().map(times)));
         Self {
             steps: steps(run, table, &dwells),
+            magnetic_noise: noise.unwrap_or_default(),
             run,
             table,
             recording,
@@ -303,6 +310,13 @@ impl<'a> Stretch<'a> {
         };
         let pulse = self.run.recording.imu.pulse.get(sensor).powi(2) / 12.0;
         own + pulse * model.weight(BudgetSource::Pulses)
+    }
+
+    /// Mean output of the magnetometer over these samples at rest, if there is one.
+    pub fn magnetic(&self, samples: &Range<usize>) -> Option<MagneticMean> {
+        let recording = &self.run.recording;
+        let time = recording.imu.times(samples);
+        (recording.magnetometer.as_ref())?.mean(&time, &self.magnetic_noise)
     }
 
     /// Variance of the position per axis at the start of a dwell, m².

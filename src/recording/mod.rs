@@ -4,6 +4,7 @@
 
 pub mod faults;
 mod log_facts;
+mod magnetometer;
 mod near;
 mod samples;
 mod segment;
@@ -12,6 +13,7 @@ mod temperature;
 
 pub use faults::{Bridge, Fault, FaultKind, Slower};
 pub use log_facts::{ColumnFacts, LogFacts, NamedColumns, TemperatureFacts};
+pub use magnetometer::{MAGNETIC_COUNT, MagneticMean, MagneticNoise, Magnetometer};
 pub use near::Near;
 pub use samples::{FEWEST_SAMPLES, stretches_between};
 pub use samples::{ImuSamples, SampleError, Stretch};
@@ -39,6 +41,8 @@ pub struct Recording {
     pub meta: BTreeMap<String, String>,
     /// The instrument's samples.
     pub imu: ImuSamples,
+    /// Magnetometer, if any.
+    pub magnetometer: Option<Magnetometer>,
     /// Turntable readings, if any.
     pub table: Option<TableLog>,
     /// Labelled sections, if any.
@@ -99,6 +103,7 @@ impl Recording {
             name: name.to_owned(),
             meta: BTreeMap::new(),
             imu,
+            magnetometer: None,
             table: None,
             segments: Vec::new(),
             files: Vec::new(),

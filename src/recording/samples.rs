@@ -225,6 +225,12 @@ impl ImuSamples {
             })
     }
 
+    /// Time of these samples, s.
+    pub fn times(&self, samples: &Range<usize>) -> Range<f64> {
+        let begin = self.time(samples.start);
+        begin..begin + samples.len() as f64 * self.period
+    }
+
     /// A time as a real number of samples from the first one. If the time between two stretches is longer than the
     /// number of lost samples explains, times after all lost samples between them are mapped to the last lost sample.
     pub fn edge(&self, time: f64) -> f64 {

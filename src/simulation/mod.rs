@@ -4,8 +4,10 @@
 //! table use separate random generators, so that a change of one does not affect the others.
 
 mod campaign;
+mod draw;
 mod drive;
 mod increments;
+mod magnetometer;
 mod runs;
 mod scenario;
 mod thermal;
@@ -18,8 +20,10 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 pub use campaign::SimulatedCampaign;
+use draw::normal;
 use drive::Drive;
 pub use increments::{Integrator, true_increments};
+pub use magnetometer::MagnetometerModel;
 pub use runs::Runs;
 pub use scenario::{Given, Scenario};
 use thermal::Warming;
@@ -27,16 +31,17 @@ pub use thermal::{Chamber, ThermalTruth};
 
 use crate::attitude::{exp, quaternion};
 use crate::calibration::result::{FORMAT_WITH_TEMPERATURE, TermRecord};
-use crate::calibration::{Calibration, Difference, ThermalRecord, truth_record};
+use crate::calibration::{Calibration, Difference, MagRecord, ThermalRecord, truth_record};
 use crate::imu::{
     Instrument, NoiseSource, Nominal, Output, PerSensor, Pulses, Sensor, TERM_PARAMETERS, Term,
     TermVector, Triad,
 };
+use crate::magnetic::MagneticTriad;
 use crate::navigation::samples_of;
-use crate::recording::{ImuSamples, Recording, TableLog, Temperature};
+use crate::recording::{ImuSamples, Magnetometer, Recording, TableLog, Temperature};
 use crate::run::{Run, SET_BY_HAND, Standstill};
 use crate::turntable::{AxisError, TABLE_GEOMETRY, TableAccuracy, TableGeometry, across};
-use crate::turntable::{Imperfection, Moves, TableError};
+use crate::turntable::{Imperfection, Motion, Moves, TableError};
 
 /// A run with its truth.
 #[derive(Debug, Clone, PartialEq)]
@@ -54,6 +59,8 @@ pub struct Simulated {
     pub geometry: SVector<f64, TABLE_GEOMETRY>,
     /// Temperature dependence of the true parameters, if they depend on temperature.
     pub thermal: Option<ThermalTruth>,
+    /// The true magnetometer and the magnitude of the field in T, if any.
+    pub magnetic: Option<(MagneticTriad, f64)>,
     /// Quantity of a sample when the run is written to a file.
     pub output: Output,
 }
@@ -66,7 +73,12 @@ impl Simulated {
             let (value, sigma) = (self.terms[k], None);
             Some((Term::parameter_name(k)?, TermRecord { value, sigma }))
         };
+        let log = self.run.recording.magnetometer.as_ref();
+        let mag = self.magnetic.as_ref().zip(log);
         Calibration {
+            mag: mag.and_then(|((triad, magnitude), log)| {
+                MagRecord::new(triad, log.field.map(|_| *magnitude), log)
+            }),
             terms: on.filter_map(term).collect(),
             ..self.truth_over(std::slice::from_ref(self), &self.truth)
         }
@@ -108,7 +120,12 @@ impl Draws {
 
     /// Stream for temperature effects, separate from all others.
     fn thermal(seed: u64, stream: u64) -> ChaCha8Rng {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed ^ THERMAL);
+        Self::beside(THERMAL, seed, stream)
+    }
+
+    /// Stream for effects that some scenarios have, separate from all others.
+    fn beside(effect: u64, seed: u64, stream: u64) -> ChaCha8Rng {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed ^ effect);
         rng.set_stream(stream);
         rng
     }
@@ -122,12 +139,10 @@ impl Draws {
 
 /// Derives a second seed: `thermal!` in ASCII.
 const THERMAL: u64 = 0x7468_6572_6d61_6c21;
+/// The same for a magnetometer: `magnetic`.
+const MAGNETIC: u64 = 0x6d61_676e_6574_6963;
 /// Interval in which temperature changes are negligible, s.
 const WARMED_EVERY: f64 = 0.1;
-
-fn normal(rng: &mut ChaCha8Rng) -> Vector3<f64> {
-    Vector3::from_fn(|_, _| StandardNormal.sample(rng))
-}
 
 impl Scenario {
     /// Simulates one run. The same seed and stream give the same bits; a Monte Carlo study keeps the seed
@@ -167,6 +182,9 @@ impl Scenario {
         let imperfection = Imperfection::draw(&self.table, || StandardNormal.sample(&mut rng));
         let terms = self.draw_terms(&mut Draws::Terms.generator(seed, instrument));
         let geometry = self.geometry(&imperfection);
+        let magnetic = (self.magnetometer.as_ref())
+            .map(|model| self.magnetic(model, &imperfection, (seed, instrument, stream)))
+            .transpose()?;
         let drive = match made.filter(|drive| drive.is_of(&imperfection, &terms)) {
             Some(drive) => Cow::Borrowed(drive),
             None => Cow::Owned(Drive::new(self, imperfection, terms)?),
@@ -192,15 +210,37 @@ impl Scenario {
             _ => *truth.get(sensor),
         };
         let imu = self.samples(&drive, &triad_at, warming.as_ref(), seed, stream);
+        let mut run = self.recorded(imu, self.readings(&drive, seed, stream));
+        let (magnetic, magnetometer) = magnetic.unzip();
+        run.recording.magnetometer = magnetometer;
+        let date = self.magnetometer.as_ref().and_then(|model| model.date);
+        let date = date.map(|(year, month, day)| format!("{year:04}-{month:02}-{day:02}"));
+        run.recording
+            .meta
+            .extend(date.map(|date| ("date".to_owned(), date)));
         Ok(Simulated {
-            run: self.recorded(imu, self.readings(&drive, seed, stream)),
+            run,
             truth,
             common,
             terms,
             geometry,
             thermal,
+            magnetic,
             output: self.output,
         })
+    }
+
+    /// The true magnetometer of an instrument, and its output in a recording.
+    fn magnetic(
+        &self,
+        model: &MagnetometerModel,
+        imperfection: &Imperfection,
+        (seed, instrument, stream): (u64, u64, u64),
+    ) -> Result<((MagneticTriad, f64), Magnetometer), TableError> {
+        let motion = Motion::new(&self.table, &self.path, imperfection)?;
+        let truth = model.draw(&mut Draws::beside(MAGNETIC, seed, instrument));
+        let mut rng = Draws::beside(MAGNETIC, seed, !stream);
+        Ok((truth, model.recorded(&truth, &motion, &mut rng)))
     }
 
     /// Output of an instrument on a drive, with the recorded temperature.

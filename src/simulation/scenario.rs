@@ -5,7 +5,8 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
-use super::{Chamber, Integrator};
+use super::magnetometer::MagnetometerFile;
+use super::{Chamber, Integrator, MagnetometerModel};
 use crate::calibration::ErrorTerm;
 use crate::calibration::model::{USUAL_LEVEL, USUAL_NORTH, usual_axis_error, usual_variation};
 use crate::earth::Site;
@@ -55,6 +56,9 @@ pub struct Scenario {
     /// The climatic chamber in which the instrument is; `None` for a constant temperature.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chamber: Option<Chamber>,
+    /// The magnetometer of the instrument, and the field at the site; `None` without one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub magnetometer: Option<MagnetometerModel>,
     /// Default seed.
     pub seed: u64,
 }
@@ -107,6 +111,11 @@ impl Scenario {
             chamber: file
                 .chamber
                 .map(ChamberFile::in_si)
+                .transpose()
+                .map_err(|message| text.inconsistent(message))?,
+            magnetometer: file
+                .magnetometer
+                .map(|magnetometer| magnetometer.in_si(&site))
                 .transpose()
                 .map_err(|message| text.inconsistent(message))?,
             seed: file.seed,
@@ -285,6 +294,7 @@ struct ScenarioFile {
     #[serde(default)]
     truth: TruthFile,
     chamber: Option<ChamberFile>,
+    magnetometer: Option<MagnetometerFile>,
 }
 
 #[derive(Deserialize)]

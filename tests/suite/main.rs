@@ -33,6 +33,7 @@ mod learnt_noise;
 mod logs;
 mod lot;
 mod lot_slow;
+mod magnetometer;
 mod mat_7_3;
 mod mistaken;
 mod modules;

@@ -67,7 +67,7 @@ impl BudgetPart {
 const STEP: f64 = 3e-4;
 
 /// Sources that act within dwells. Each part is found by filtering the chain again with a slightly larger variance.
-const AT_REST: [BudgetSource; 9] = [
+const AT_REST: [BudgetSource; 10] = [
     BudgetSource::White(Sensor::Gyro),
     BudgetSource::White(Sensor::Accel),
     BudgetSource::Pulses,
@@ -77,6 +77,7 @@ const AT_REST: [BudgetSource; 9] = [
     BudgetSource::TableReading,
     BudgetSource::Settling,
     BudgetSource::Place,
+    BudgetSource::MagneticNoise,
 ];
 
 impl Budget {
@@ -202,7 +203,10 @@ fn at_rest(
         let part = covariance * ((&here - there) / STEP) * covariance;
         Ok((source, of_parameters(&posterior.constants, &part)))
     };
-    AT_REST.par_iter().map(part).collect()
+    let has_magnetometer = problem.model.magnetic.is_on();
+    let sources = AT_REST.par_iter();
+    let sources = sources.filter(|&&of| has_magnetometer || of != BudgetSource::MagneticNoise);
+    sources.map(part).collect()
 }
 
 /// Parts of the constants that may be absent. Together they add `A Σ⁻¹ Aᵀ`: Σ is their covariance, A their covariance

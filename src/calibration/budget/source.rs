@@ -63,6 +63,12 @@ pub enum BudgetSource {
     Period,
     /// Earth rate, if it may differ from that at the stated latitude.
     EarthRate,
+    /// Prior of the magnetometer and the field at its site.
+    Magnetometer,
+    /// Noise of the magnetometer.
+    MagneticNoise,
+    /// Disturbances of the magnetic field.
+    MagneticDisturbance,
 }
 
 impl BudgetSource {
@@ -106,6 +112,9 @@ impl BudgetSource {
             Self::Rounding => "rounding of rates",
             Self::Period => "sample period",
             Self::EarthRate => "Earth rate at an uncertain latitude",
+            Self::Magnetometer => "prior of the magnetometer and its field",
+            Self::MagneticNoise => "noise of the magnetometer",
+            Self::MagneticDisturbance => "disturbances of the magnetic field",
         };
         name.to_owned()
     }

@@ -6,6 +6,7 @@ use super::states::{ATTITUDE, NAVIGATION, States, VELOCITY};
 use crate::calibration::several::day_to_day::{OwnState, Turned};
 use crate::calibration::{Constant, ParameterVector, parameter, sensor_and_parameter};
 use crate::imu::{PARAMETERS as PER_TRIAD, Sensor};
+use crate::magnetic::MagneticVector;
 use crate::navigation::{Block, ErrorVector};
 
 /// Number of rates and specific forces that are constant in a part of a dwell.
@@ -17,6 +18,8 @@ pub struct Dynamics<'a> {
     pub constants: &'a [Constant],
     /// Effect of the mounting of the recording on the parameters, if any.
     pub turned: Option<Turned>,
+    /// The magnetometer, if it is observed.
+    pub magnetic: Option<MagneticVector>,
 }
 
 impl Dynamics<'_> {
@@ -86,7 +89,7 @@ impl Dynamics<'_> {
             }
             Constant::Gravity => block.gravity,
             Constant::EarthRate(axis) => of_earth_rate(block, axis),
-            Constant::Base(_) | Constant::Axis(_) => ErrorVector::zeros(),
+            Constant::Base(_) | Constant::Axis(_) | Constant::Magnetic(_) => ErrorVector::zeros(),
         }
     }
 }

@@ -40,6 +40,7 @@ impl Effect {
                     | Source::TablePosition
                     | Source::GyroGaussMarkov
                     | Source::AccelGaussMarkov
+                    | Source::MagneticDisturbance
             ),
             Self::Difference(_) | Self::Stated(_) => false,
         }
@@ -91,6 +92,13 @@ impl Sizes {
     /// The events.
     pub fn events(&self) -> impl Iterator<Item = ((Effect, usize), f64)> + '_ {
         self.events.iter().map(|(&event, &factor)| (event, factor))
+    }
+
+    /// A copy with the variance of each event of an effect multiplied by a factor.
+    pub fn scaled(mut self, effect: Effect, factor: f64) -> Self {
+        let events = self.events.iter_mut().filter(|((of, _), _)| *of == effect);
+        events.for_each(|(_, variance)| *variance *= factor);
+        self
     }
 
     /// A copy in which every effect has the size with which the links were made.

@@ -2,6 +2,7 @@
 
 mod given;
 mod link;
+mod magnetic;
 mod maker;
 mod rows;
 mod transition;

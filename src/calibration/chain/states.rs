@@ -31,6 +31,8 @@ pub struct States {
     pub earth_rate: Option<usize>,
     /// Gravity error; `None` unless there are several sites.
     pub gravity: Option<usize>,
+    /// Disturbance of the magnetic field in a dwell, with a magnetometer.
+    pub magnetic: Option<usize>,
     /// State of each quantity that differs between recordings.
     pub own: Vec<(usize, OwnState)>,
     /// Total number of states.
@@ -56,6 +58,7 @@ impl States {
         let biases = PerSensor::from_fn(|_: Sensor| added(3));
         let earth_rate = by_hand.then(|| added(3));
         let gravity = (model.gravity_sigma > 0.0 && !one_gravity).then(|| added(1));
+        let magnetic = model.magnetic.is_on().then(|| added(3));
         let own = own.map(|own| (added(1), own)).collect();
         Self {
             moving,
@@ -64,6 +67,7 @@ impl States {
             biases,
             earth_rate,
             gravity,
+            magnetic,
             own,
             count,
         }

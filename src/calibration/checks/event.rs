@@ -28,6 +28,8 @@ pub enum EventKind {
     BiasStep(Sensor),
     /// A lasting rotation of the instrument on the table, or of the table on the ground.
     Slip(Slip),
+    /// The magnetic field in one dwell.
+    Field,
 }
 
 /// An event that is too large to result from its effect by chance, even if the effect has a heavy-tailed distribution.
@@ -39,7 +41,7 @@ pub struct Event {
     pub dwell: usize,
     /// End of the first part of this dwell, s.
     pub time: f64,
-    /// Size of the event, in rad, m/s, rad/s or m/s².
+    /// Size of the event, in rad, m/s, rad/s, m/s² or parts of the local field.
     pub size: f64,
     /// −2 ln of the p-value.
     pub significance: f64,
@@ -159,6 +161,7 @@ impl EventKind {
             Effect::Noise(Source::AccelMotion) => Self::Velocity,
             Effect::Noise(Source::GyroGaussMarkov) => Self::BiasStep(Sensor::Gyro),
             Effect::Noise(Source::AccelGaussMarkov) => Self::BiasStep(Sensor::Accel),
+            Effect::Noise(Source::MagneticDisturbance) => Self::Field,
             Effect::Slip(slip) => Self::Slip(slip),
             _ => return None,
         })
@@ -172,6 +175,7 @@ impl EventKind {
             Self::Move => Some(ATTITUDE),
             Self::Velocity => Some(VELOCITY),
             Self::BiasStep(sensor) => Some(*layout.biases.get(sensor)),
+            Self::Field => layout.magnetic,
             Self::Slip(Slip::Mount) => layout.slips.map(|[mount, _]| mount),
             Self::Slip(Slip::Base) => layout.slips.map(|[_, base]| base),
         };
@@ -221,6 +225,15 @@ impl EventKind {
                     ),
                 )
             }
+            Self::Field => (
+                Kind::FieldDisturbed,
+                format!(
+                    "In dwell {number} (at {time:.1} s) the magnetic field is off by {:.2} % of the local field. turncal \
+                     gave the magnetometer next to no weight there. Keep steel, magnets and currents away, or hold the \
+                     instrument elsewhere",
+                    100.0 * size
+                ),
+            ),
             Self::Slip(slip) => {
                 let what = match slip {
                     Slip::Mount => "the instrument slipped on the table",

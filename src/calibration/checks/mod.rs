@@ -6,6 +6,7 @@ pub mod form;
 pub mod innovation;
 pub mod labels;
 pub mod latitude;
+pub mod magnetic;
 pub mod observability;
 pub mod prior_distance;
 pub mod quality;
@@ -51,6 +52,7 @@ pub fn findings(problem: &Problem, outcome: &Outcome) -> Vec<Finding> {
         .chain(unexplained::not_converged(outcome))
         .chain(unexplained::absurd(problem, outcome))
         .chain(latitude::earth_rate(problem, outcome))
+        .chain(magnetic::magnetic(problem, outcome))
         .chain(far)
         .chain(form)
         .chain(of_noise)

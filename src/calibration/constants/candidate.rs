@@ -3,6 +3,7 @@
 use super::constant::Constant;
 use crate::calibration::{Coefficient, ErrorTerm, Model, PARAMETERS};
 use crate::imu::{ParameterKind, Sensor, TERM_PARAMETERS, Triad};
+use crate::magnetic::MAGNETIC;
 use crate::turntable::AXIS_ERRORS;
 
 /// Constants that are absent or present together, with one size.
@@ -46,7 +47,8 @@ impl Constant {
         let table = table.chain((0..AXIS_ERRORS).map(Self::Axis));
         let rate = (0..3).map(Self::EarthRate);
         let thermal = Coefficient::all(model.form, model.thermal.as_deref()).into_iter();
-        let beside = terms.chain(table).chain(rate);
+        let magnetic = (0..MAGNETIC).map(Self::Magnetic);
+        let beside = terms.chain(table).chain(rate).chain(magnetic);
         let beside = beside.chain(thermal.map(Self::Thermal));
         let beside = beside.filter(|constant| constant.sigma(model) > 0.0);
         let (known, candidates): (Vec<Self>, Vec<Self>) =

@@ -24,6 +24,8 @@ pub enum Constant {
     Axis(usize),
     /// Deviation of Earth rate from its value at the stated latitude, by axis: East, North, Up.
     EarthRate(usize),
+    /// A constant of the magnetometer or its field, by its index.
+    Magnetic(usize),
 }
 
 impl Constant {
@@ -32,6 +34,7 @@ impl Constant {
         match self {
             Self::Parameter(_) => BudgetSource::Prior,
             Self::EarthRate(_) => BudgetSource::EarthRate,
+            Self::Magnetic(_) => BudgetSource::Magnetometer,
             Self::Term(index) => Term::of(index).map_or(BudgetSource::Prior, BudgetSource::Term),
             Self::Thermal(_) => BudgetSource::Temperature,
             Self::Gravity => BudgetSource::Gravity,
@@ -78,6 +81,7 @@ impl Constant {
             Self::Base(axis) => model.geometry.base[axis],
             Self::Axis(index) => model.geometry.axes[index],
             Self::EarthRate(_) => 0.0,
+            Self::Magnetic(index) => model.magnetic.sigma[index],
         };
         if stated > 0.0 {
             return stated;

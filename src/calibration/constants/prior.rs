@@ -28,6 +28,9 @@ impl Prior {
             Constant::Parameter(index) => parameters[index],
             Constant::Term(index) => -at.terms[index],
             Constant::Thermal(of) => -of.of(&at.thermal),
+            Constant::Magnetic(index) => at
+                .magnetic
+                .map_or(0.0, |at| model.magnetic.mean[index] - at[index]),
             _ => 0.0,
         };
         let may_be_absent = |of: &&Constant| Candidate::of(**of, model).is_some();

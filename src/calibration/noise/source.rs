@@ -85,6 +85,8 @@ sources! {
         "imu.noise" GYRO.gauss_markov, part of Wander(Gyro);
     AccelGaussMarkov, Accel, "Gauss-Markov bias of the accelerometers" in "ug" = MICRO_G,
         "imu.noise" ACCEL.gauss_markov, part of Wander(Accel);
+    MagneticDisturbance, Gyro, "disturbance of the magnetic field" in "nT" = 1e-9,
+        "imu.noise" ("mag_disturbance_nt", 1e-9), part of MagneticDisturbance;
 }
 
 impl Source {
@@ -123,6 +125,7 @@ impl Source {
             Self::GyroGaussMarkov | Self::AccelGaussMarkov => {
                 noise.gauss_markov.map_or(0.0, |bias| bias.sigma)
             }
+            Self::MagneticDisturbance => model.magnetic.disturbance,
         }
     }
 
@@ -139,6 +142,7 @@ impl Source {
                 model.set_standstill_variance(sensor, sigma.powi(2));
             }
             Self::RotationAtRest => model.turning_at_rest = sigma,
+            Self::MagneticDisturbance => model.magnetic.disturbance = sigma,
             Self::TablePosition => model.position_sigma = sigma,
             Self::TableReading => model.reading_sigma = sigma,
             Self::Settling => model.settling_sigma = sigma,

@@ -9,6 +9,7 @@ use super::schedule::{AtRest, Step};
 use crate::attitude::{log, to_tilt_and_heading};
 use crate::calibration::{Observation, Problem, Stretch};
 use crate::navigation::{Block, Navigator, State};
+use crate::recording::MagneticMean;
 use crate::turntable::AxisResponse;
 
 /// Dwell steps processed at once, of the length of the first: 10 s, during which even a hand-held body keeps its
@@ -33,6 +34,8 @@ pub struct Rest {
     pub steps: Vec<Standing>,
     /// Observations, step by step.
     pub seen: Vec<Seen>,
+    /// Mean output of the magnetometer, if any.
+    pub magnetic: Option<MagneticMean>,
 }
 
 /// A step of a dwell.
@@ -135,6 +138,7 @@ impl Rest {
             models: models.into_iter().map(|(.., model)| model).collect(),
             steps,
             seen,
+            magnetic: stretch.magnetic(&whole),
         }
     }
 

@@ -6,6 +6,7 @@
 pub(super) mod at_temperature;
 pub(super) mod correction;
 pub mod frame;
+pub(super) mod magnetic;
 pub mod nees;
 pub(super) mod record;
 pub(super) mod thermal_record;
@@ -19,6 +20,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use super::budget::BudgetRecord;
 use super::noise::NoiseReport;
+use crate::calibration::result::magnetic::MagRecord;
 use crate::calibration::result::thermal_record::{RecordingRecord, ThermalRecord};
 use crate::calibration::{Direction, Finding, Quality, Verdict, Word};
 use crate::imu::{AXES, BodyFrame, InstallationForm, Nominal, Output, PerSensor, Sensor, Triad};
@@ -59,6 +61,9 @@ pub struct Calibration {
     pub gyro: TriadRecord,
     /// The accelerometers.
     pub accel: TriadRecord,
+    /// The magnetometer, if it was calibrated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mag: Option<MagRecord>,
     /// Unit of the file's quantity, such as `count`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<PerSensor<String>>,
@@ -357,10 +362,11 @@ impl Calibration {
     }
 
     /// A parameter by name: `gyro.scale.x` and `gyro.bias.x` in the file's quantity, `gyro.installation.xy` for the
-    /// entry of the misalignment matrix in that row and column, and likewise for `accel`; also parameters of error
+    /// entry of the misalignment matrix in that row and column, and likewise for `accel`; `mag.matrix.xy` and `mag.bias.x`; also parameters of error
     /// terms such as `accel.time_offset`, in SI.
     pub fn get(&self, name: &str) -> Option<&f64> {
         let of_triads = entry(name, |sensor| self.triad(sensor));
+        let of_triads = of_triads.or_else(|| self.mag.as_ref()?.get(name));
         of_triads.or_else(|| self.terms.get(name).map(|term| &term.value))
     }
 
@@ -382,6 +388,7 @@ impl Calibration {
     pub fn sigma_of(&self, name: &str) -> Option<&f64> {
         let sigma = self.sigma.as_ref()?;
         let of_triads = entry(name, |sensor| sigma.get(sensor));
+        let of_triads = of_triads.or_else(|| self.mag.as_ref()?.sigma_of(name));
         of_triads.or_else(|| self.terms.get(name)?.sigma.as_ref())
     }
 }

@@ -12,9 +12,9 @@ use super::{
 };
 use crate::calibration::parameters::{Before, factor};
 use crate::calibration::{
-    AtRest, Auxiliary, Budget, ClosedForm, Estimate, Finding, Nis, Outcome, PARAMETERS,
-    ParameterVector, Problem, Quality, Reference, TermEvidence, Verdict, auxiliary_name,
-    from_vector, parameter_name,
+    AtRest, Auxiliary, Budget, ClosedForm, Estimate, Finding, MagRecord, MagneticEstimate, Nis,
+    Outcome, PARAMETERS, ParameterVector, Problem, Quality, Reference, TermEvidence, Verdict,
+    auxiliary_name, from_vector, parameter_name,
 };
 use crate::imu::{BodyFrame, InstallationForm, Nominal, Output, PerSensor, Sensor, Triad};
 use crate::run::Run;
@@ -42,6 +42,7 @@ impl Outcome {
         let thermal = self.thermal.as_ref();
         let body_frame = problem.model.aiding.body_frame();
         let record = Calibration {
+            mag: mag_record(self.magnetic.as_ref(), run),
             format: format.to_owned(),
             method: Some(Method::Ekf),
             aiding: Some(problem.model.aiding),
@@ -119,6 +120,11 @@ impl Calibration {
     }
 }
 
+/// The record of a magnetometer, if the run has one and it was calibrated.
+fn mag_record(estimate: Option<&MagneticEstimate>, run: &Run) -> Option<MagRecord> {
+    MagRecord::of_estimate(estimate?, run.recording.magnetometer.as_ref()?)
+}
+
 impl GravityRecord {
     fn new((m_s2, sigma_m_s2): (f64, f64)) -> Self {
         Self { m_s2, sigma_m_s2 }
@@ -137,6 +143,7 @@ impl ClosedForm {
             _ => self.estimate.record(run, body_frame),
         };
         let record = Calibration {
+            mag: mag_record(self.magnetic.as_ref(), run),
             quality: Some(quality.clone()),
             method: Some(Method::SixPosition),
             provenance: Some(problem.provenance()),

@@ -8,8 +8,8 @@ use rayon::prelude::*;
 use super::day_to_day::DayToDay;
 use crate::calibration::iterations::{Solved, solve};
 use crate::calibration::{
-    AttitudePrior, CalibrationError, Estimate, Linearisation, Model, Problem, UNWATCHED,
-    coarse_start, from_vector, parameter, to_vector,
+    AttitudePrior, CalibrationError, Estimate, Linearisation, MagneticPrior, Model, Problem,
+    UNWATCHED, coarse_start, from_vector, parameter, to_vector,
 };
 use crate::imu::{
     PerSensor, Sensor, THERMAL_FUNCTIONS, ThermalModel, ThermalRange, ThermalState, thermal_state,
@@ -56,6 +56,8 @@ pub fn each(problem: &Problem) -> Result<Vec<SeparateEstimate>, CalibrationError
         let plain = problem.recordings(|of| of == number).with(|model| {
             model.thermal = None;
             model.day_to_day = DayToDay::default();
+            // All recordings together have one magnetometer.
+            model.magnetic = MagneticPrior::default();
         });
         alone(&plain, problem.model.thermal.as_ref())
     });

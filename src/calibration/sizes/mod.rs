@@ -15,7 +15,7 @@ use crate::calibration::checks::recordings::RecordingDifference;
 use crate::calibration::noise::{INTERVAL, NAMED};
 use crate::calibration::{
     CalibrationError, Constant, Known, Model, NoisePolicy, NoiseReport, NoiseTest, Posterior,
-    Prior, Problem, Script, SourceFigures,
+    Prior, Problem, Script, Source, SourceFigures,
 };
 use crate::statistics::{FALSE_ALARM, chi_square_limit};
 pub use averages::LARGEST;
@@ -30,6 +30,11 @@ use usual::What;
 const ROUNDS: usize = 4;
 /// Sizes and averages have settled if no log size (in its σ) and no probability of absence changes by more than this.
 const SETTLED: f64 = 0.1;
+
+/// Factor of the variance of the three components of a disturbance because its weight is estimated too: information on
+/// the location of Student's t without this weight over that with it (Louis 1982, J. Royal Stat. Soc. B 44(2);
+/// Lange, Little, Taylor 1989).
+const MISSING: f64 = (FREEDOM + 5.0) / (FREEDOM + 3.0);
 
 /// An estimated size.
 #[derive(Debug, Clone, Copy)]
@@ -260,12 +265,13 @@ impl Effects {
                 sizes.with(Effect::Slip(slip), 0.0)
             });
         }
+        // A variance that follows its own disturbance makes the disturbance seem better known than it is.
+        let of_field = Effect::Noise(Source::MagneticDisturbance);
+        let events = self.events.clone().scaled(of_field, MISSING);
         let each = self.between.iter();
-        each.fold(self.events.clone(), |sizes, size| {
-            match size.usual.effect() {
-                Some(effect) => sizes.with(effect, (2.0 * size.log).exp()),
-                None => sizes,
-            }
+        each.fold(events, |sizes, size| match size.usual.effect() {
+            Some(effect) => sizes.with(effect, (2.0 * size.log).exp()),
+            None => sizes,
         })
     }
 

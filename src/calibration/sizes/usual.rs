@@ -13,6 +13,9 @@ pub const LOG_SIGMA: f64 = 1.098_612_288_668_109_8;
 const LOG_SIGMA_NOT_STATED: f64 = std::f64::consts::LN_10;
 /// Default correlation time of a bias, s.
 const CORRELATION_TIME: f64 = 100.0;
+/// Typical disturbance of the magnetic field, T: the Earth's field itself varies by tens of nanotesla within hours on a
+/// quiet day (Campbell, *Introduction to Geomagnetic Fields*, 2nd ed., ch. 2); a building is found by the data.
+const DISTURBANCE: f64 = 2e-9;
 /// Typical differences between recordings, divided by the prior σ of an instrument.
 const DIFFERENCE: f64 = 0.1;
 
@@ -158,6 +161,7 @@ fn not_stated(source: Source, problem: &Problem, moves: &Moves) -> Option<f64> {
         Source::RotationAtRest => (!table).then_some(walk),
         Source::Settling => table.then_some(model.reading_sigma),
         Source::GyroGaussMarkov | Source::AccelGaussMarkov => Some(walk / CORRELATION_TIME.sqrt()),
+        Source::MagneticDisturbance => model.magnetic.is_on().then_some(DISTURBANCE),
         _ => None,
     }
 }

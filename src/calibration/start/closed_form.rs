@@ -15,8 +15,8 @@ use crate::calibration::checks::rounding::{by_rounding, rounded};
 use crate::calibration::checks::unexplained::unexplained_residuals;
 use crate::calibration::linearisation::singular;
 use crate::calibration::{
-    CalibrationError, Estimate, Finding, Level, Model, Problem, checks, from_vector, parameter,
-    parameter_name, to_vector,
+    CalibrationError, Estimate, Finding, Level, MagneticEstimate, Model, Problem, checks,
+    from_vector, parameter, parameter_name, to_vector,
 };
 use crate::calibration::{Verdict, Word};
 use crate::earth::Site;
@@ -55,6 +55,8 @@ impl Reference {
 pub struct ClosedForm {
     /// The estimate; its σ follow from random walk, pulses and the uncertainty of the inputs.
     pub estimate: Estimate,
+    /// The magnetometer, from gravity alone.
+    pub magnetic: Option<MagneticEstimate>,
     /// Source of the reference inputs.
     pub reference: Reference,
     /// Number of dwells or labelled positions used for each triad.
@@ -163,6 +165,7 @@ pub fn six_position_of(
     Ok(ClosedForm {
         findings,
         estimate,
+        magnetic: None,
         reference: Reference::Table,
         positions: PerSensor::from_fn(|sensor| observed.get(sensor).known.len()),
         turns: 0,
@@ -217,6 +220,7 @@ fn by_labels(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
     Ok(ClosedForm {
         findings,
         estimate,
+        magnetic: None,
         reference: Reference::Labels,
         positions: PerSensor::from_fn(|_| standing.len()),
         turns: sections.len() - standing.len(),
@@ -242,6 +246,7 @@ fn by_gravity(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
             .chain(solution.residuals.finding("both triads"))
             .collect(),
         estimate,
+        magnetic: None,
         reference: Reference::Gravity,
         positions: PerSensor::from_fn(|_| count),
         turns: count - rests.len(),
@@ -257,6 +262,7 @@ fn by_gravity_alone(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
     Ok(ClosedForm {
         findings: far.chain(hidden).chain(found.findings).collect(),
         estimate: found.estimate,
+        magnetic: found.magnetic,
         reference: Reference::GravityAlone,
         positions: PerSensor::from_fn(|_| found.count),
         turns: 0,

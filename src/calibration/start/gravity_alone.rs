@@ -3,7 +3,7 @@
 //! The accelerometers follow from the magnitude of gravity in the dwells and from labels, if there are any; the gyro
 //! biases follow from the rates at rest. All other parameters keep their prior.
 
-use nalgebra::{Matrix3, SMatrix, Vector2, Vector3};
+use nalgebra::{DMatrix, Matrix3, SMatrix, Vector2, Vector3};
 
 use super::coarse::{calibrated, dwells};
 use super::equations::{Common, Equations, Rows, gauss_newton, of};
@@ -13,11 +13,13 @@ use crate::attitude::skew;
 use crate::calibration::checks::prior_distance::widened;
 use crate::calibration::checks::residuals::Residuals;
 use crate::calibration::linearisation::singular;
+use crate::calibration::magnetometer::{self, Alone, Up};
 use crate::calibration::model::usual_variation;
 use crate::calibration::problem::Stretch;
 use crate::calibration::{
-    CalibrationError, Estimate, Finding, Model, NoisePolicy, PARAMETERS, ParameterMatrix,
-    ParameterVector, Problem, checks, from_vector, parameter, sensor_and_parameter, to_vector,
+    CalibrationError, Estimate, Finding, MagneticEstimate, Model, NoisePolicy, PARAMETERS,
+    ParameterMatrix, ParameterVector, Problem, checks, from_vector, parameter,
+    sensor_and_parameter, to_vector,
 };
 use crate::imu::{
     Noise, PARAMETERS as PER_TRIAD, ParameterKind, PerSensor, Sensor, Triad, TriadVector,
@@ -65,6 +67,8 @@ struct Positions<'a> {
 pub struct Standing {
     pub estimate: Estimate,
     pub findings: Vec<Finding>,
+    /// The magnetometer, if there is one and the dwells determine it.
+    pub magnetic: Option<MagneticEstimate>,
     /// Number of dwells, and their total time, s.
     pub count: usize,
     pub time: f64,
@@ -95,7 +99,10 @@ pub fn standing(problem: &Problem) -> Result<Standing, CalibrationError> {
         positions.gyro_biases(&mut estimate)?;
     }
     let rests = || positions.rests.iter().flatten();
+    let magnetic = positions.magnetometer(&estimate)?;
+    findings.extend(checks::magnetic::alone(problem, magnetic.as_ref()));
     Ok(Standing {
+        magnetic: magnetic.map(|alone| alone.estimate),
         estimate,
         findings,
         count: rests().count(),
@@ -142,6 +149,36 @@ impl Positions<'_> {
         equations.events = events(self.problem, &self.rests);
         equations.correlated = true;
         Ok(equations)
+    }
+
+    /// The magnetometer from its angle to gravity in each dwell.
+    fn magnetometer(&self, estimate: &Estimate) -> Result<Option<Alone>, CalibrationError> {
+        let first = parameter(Sensor::Accel, 0);
+        let own = estimate
+            .covariance
+            .fixed_view::<PER_TRIAD, PER_TRIAD>(first, first);
+        let eigen = own.into_owned().symmetric_eigen();
+        let roots = eigen.eigenvalues.map(|value| value.max(0.0).sqrt());
+        let common = eigen.eigenvectors * SMatrix::from_diagonal(&roots);
+        let mut all = Vec::new();
+        for (stretch, rest) in self.each() {
+            let stretch = &self.problem.stretches()[stretch];
+            let Some(mean) = stretch.magnetic(&rest.samples) else {
+                continue;
+            };
+            let Force { size, up, error } = Force::of(&estimate.triads, rest)?;
+            let level = (Matrix3::identity() - up * up.transpose()) / size;
+            let by_common = level * error * common;
+            all.push(magnetometer::AtRest {
+                mean,
+                up: Some(Up {
+                    direction: up,
+                    tilt: rest.mean.accel.variance.sqrt() / size,
+                    by_common: DMatrix::from_column_slice(3, PER_TRIAD, by_common.as_slice()),
+                }),
+            });
+        }
+        Ok(Alone::new(&all, &self.problem.model.magnetic))
     }
 
     /// Every dwell, with the number of its stretch.

@@ -9,7 +9,7 @@ mod earth_rate;
 mod elimination;
 pub mod equations;
 mod gravity;
-mod gravity_alone;
+pub mod gravity_alone;
 mod labels;
 mod least_squares;
 pub mod mounting;

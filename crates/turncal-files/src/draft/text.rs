@@ -265,6 +265,7 @@ impl Draft {
             time,
             gyro: names(columns.triads.gyro),
             accel: names(columns.triads.accel),
+            mag: None,
             temperature: (columns.temperature).map(|k| TemperatureColumn::One(self.name(k))),
         }
     }

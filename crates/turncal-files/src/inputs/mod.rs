@@ -2,6 +2,7 @@
 
 pub mod course;
 pub mod joined;
+pub mod magnetometer;
 pub mod segments;
 pub mod source;
 pub mod table_log;

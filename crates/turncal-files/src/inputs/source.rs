@@ -1,7 +1,7 @@
 //! Sources of rows and their clocks, described in `run.toml`.
 
 use crate::schema::instrument::Fields;
-use crate::schema::{TimeColumn, TimeUnitField};
+use crate::schema::{AccelFromFile, TimeColumn, TimeUnitField};
 use turncal_input::{FileError, Positive, list, suggestion};
 use turncal_logs::clock::{Breaks, Clock, TimeUnit};
 use turncal_logs::{DataFile, Source};
@@ -73,7 +73,18 @@ impl<'a> Fields<'a> {
         gyro: &Source<'a>,
         of_gyro: Clock<'a>,
     ) -> Result<Option<(Source<'a>, Clock<'a>)>, FileError> {
-        let Some(fields) = &self.run.imu.accel_from else {
+        let fields = self.run.imu.accel_from.as_ref();
+        self.further(fields, "imu.accel_from", (gyro, of_gyro))
+    }
+
+    /// Source and clock of a sensor with these fields, at this path of the document, if they are there.
+    pub fn further(
+        &self,
+        fields: Option<&'a AccelFromFile>,
+        path: &str,
+        (gyro, of_gyro): (&Source<'a>, Clock<'a>),
+    ) -> Result<Option<(Source<'a>, Clock<'a>)>, FileError> {
+        let Some(fields) = fields else {
             return Ok(None);
         };
         let file = fields.file.as_ref();
@@ -83,7 +94,7 @@ impl<'a> Fields<'a> {
             salvage: fields.salvage.unwrap_or(gyro.salvage),
         };
         let stated = (fields.time_unit.as_ref(), fields.sample_period_s);
-        let mut clock = self.clock("imu.accel_from", fields.time.as_ref(), stated)?;
+        let mut clock = self.clock(path, fields.time.as_ref(), stated)?;
         if clock.column.is_none() {
             (clock.column, clock.nanoseconds) = (of_gyro.column, of_gyro.nanoseconds);
         }
@@ -91,8 +102,8 @@ impl<'a> Fields<'a> {
             clock.unit = of_gyro.unit;
         }
         if clock.column.is_none() {
-            let meaning = "the time column of the accelerometers, because two separate streams both need a time column";
-            return Err(self.document.missing("imu.accel_from.time", meaning));
+            let meaning = "the time column of the sensor, because two separate streams both need a time column";
+            return Err(self.document.missing(&format!("{path}.time"), meaning));
         }
         Ok(Some((source, clock)))
     }

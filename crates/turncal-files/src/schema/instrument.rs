@@ -8,6 +8,7 @@ use super::{Names, RunFile};
 use crate::imu_log::ImuLog;
 use crate::inputs::temperature::TemperatureColumns;
 use crate::quantity::units;
+use turncal::calibration::Source;
 use turncal::imu::{
     GaussMarkov, Instrument, MotionNoise, Noise, NoiseKeys, Nominal, Output, PerSensor, Prior,
     Sensor,
@@ -148,8 +149,9 @@ impl<'a> Fields<'a> {
         let unit = PerSensor::try_from_fn(|sensor| self.unit(sensor))?;
         let nominal = PerSensor::try_from_fn(|sensor| self.nominal(sensor, unit.get(sensor)))?;
         let names = Sensor::ALL.map(|sensor| NoiseKeys::of(sensor).names());
-        let names = names.as_flattened();
-        (self.document).only("imu.noise", imu.noise.keys(), names)?;
+        let (_, (disturbance, _)) = Source::MagneticDisturbance.stated_in();
+        let names = [names.as_flattened(), &[disturbance]].concat();
+        (self.document).only("imu.noise", imu.noise.keys(), &names)?;
         let noise = PerSensor::try_from_fn(|sensor| self.noise(sensor))?;
         let prior = PerSensor::try_from_fn(|sensor| self.prior(sensor, *nominal.get(sensor)))?;
         let (term_sigma, absent_terms) = stated_terms(self.document, "imu.terms", &imu.terms)?;

@@ -47,6 +47,8 @@ pub fn run_of_text(
     let site = fields.site()?;
     let instrument = fields.instrument()?;
     let table_log = fields.table_log()?;
+    let gyro = (&instrument.log.source, instrument.log.clock);
+    let magnetometer = fields.magnetometer(&site, gyro)?;
     let segments_file = file.segments.as_ref().map(|of| fields.file(&of.file));
     let mut notes = fields.notes;
 
@@ -58,8 +60,12 @@ pub fn run_of_text(
         other_file(&instrument.log),
         table_log.as_ref().map(|log| log.source.file.to_path_buf()),
         segments_file.as_deref().map(Path::to_owned),
+        magnetometer.as_ref().and_then(|of| of.own_file(log)),
     ];
     let imu = instrument.samples(&mut notes)?;
+    let magnetometer = magnetometer
+        .map(|of| of.read(&imu, &mut notes))
+        .transpose()?;
     let known = instrument.with_noise(&imu, &mut notes);
     let table = (table_log.as_ref()).map(|log| log.read(&imu, &mut notes));
     let table = table.transpose()?;
@@ -73,6 +79,7 @@ pub fn run_of_text(
             name: name(path),
             meta: file.meta.clone(),
             imu,
+            magnetometer,
             table,
             segments,
             files: files.into_iter().flatten().collect(),
@@ -121,8 +128,10 @@ pub fn read_meta(path: &Path) -> Result<BTreeMap<String, String>, FileError> {
 pub fn check(document: Document) -> Result<(), FileError> {
     let run = run_file(document)?;
     let mut fields = Fields::new(document, &run, &[]);
-    fields.site()?;
-    fields.instrument()?;
+    let site = fields.site()?;
+    let instrument = fields.instrument()?;
+    let gyro = (&instrument.log.source, instrument.log.clock);
+    fields.magnetometer(&site, gyro)?;
     fields.table_log().map(drop)
 }
 

@@ -75,6 +75,8 @@ pub struct ImuFile {
     pub stream: Option<String>,
     /// Accelerometers that are not in the rows of the gyros
     pub accel_from: Option<AccelFromFile>,
+    /// Magnetometer that is not in the rows of the gyros
+    pub mag_from: Option<AccelFromFile>,
     /// Use a damaged log up to the damaged part; default: false
     pub salvage: Option<bool>,
     /// Quantity in a row: number of whole counts in the sample (pulse), integral over the sample (increment) or mean
@@ -84,6 +86,8 @@ pub struct ImuFile {
     pub gyro_unit: Option<String>,
     /// Unit of the accelerometers: count; for increments m/s, g*s; for rates m/s^2, g, mg
     pub accel_unit: Option<String>,
+    /// Unit of the magnetometer: uT, nT, mT, T, G, mG or count
+    pub mag_unit: Option<String>,
     /// End of the range of the gyros, in the unit of a row; samples with this value are saturated
     pub gyro_full_scale: Option<Positive>,
     /// End of the range of the accelerometers, in the unit of a row; samples with this value are saturated
@@ -150,15 +154,15 @@ impl ImuFile {
 #[derive(Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AccelFromFile {
-    /// Log of the accelerometers; default: that of the gyros
+    /// Log of the sensor; default: that of the gyros
     pub file: Option<String>,
-    /// Stream that contains the accelerometers
+    /// Stream that contains the sensor
     pub stream: Option<String>,
     /// Use a damaged log up to the damaged part
     pub salvage: Option<bool>,
-    /// Time column of the accelerometers
+    /// Time column of the sensor
     pub time: Option<TimeColumn>,
-    /// Unit of the time column of the accelerometers
+    /// Unit of the time column of the sensor
     pub time_unit: Option<TimeUnitField>,
     /// Time from row to row, s
     pub sample_period_s: Option<Positive>,
@@ -194,6 +198,8 @@ pub struct ImuColumns {
     pub gyro: Option<Names<3>>,
     /// Three accelerometer columns, in the order of body_axes
     pub accel: Option<Names<3>>,
+    /// Three magnetometer columns, in any order
+    pub mag: Option<Names<3>>,
     /// Temperature column of the instrument, or one or three for each triad
     pub temperature: Option<TemperatureColumn>,
 }

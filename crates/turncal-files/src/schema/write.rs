@@ -96,7 +96,13 @@ fn imu_rows(file: &mut dyn Write, run: &Run, output: Output) -> io::Result<()> {
     let imu = &run.recording.imu;
     let (period, temperature) = (imu.period, imu.temperature.as_ref());
     let further = temperature.map_or("", |_| ",temperature");
-    writeln!(file, "t,gx,gy,gz,ax,ay,az{further}")?;
+    let mut mag = run
+        .recording
+        .magnetometer
+        .as_ref()
+        .map(|of| of.values().peekable());
+    let columns = mag.as_ref().map_or("", |_| ",mx,my,mz");
+    writeln!(file, "t,gx,gy,gz,ax,ay,az{further}{columns}")?;
     for (k, samples) in imu.gyro.iter().zip(imu.accel.iter()).enumerate() {
         write!(file, "{}", nanoseconds(imu.time(k)))?;
         for (sensor, sample) in [(Sensor::Gyro, samples.0), (Sensor::Accel, samples.1)] {
@@ -113,6 +119,13 @@ fn imu_rows(file: &mut dyn Write, run: &Run, output: Output) -> io::Result<()> {
         if let Some(temperature) = temperature {
             let middle = imu.time(k) + 0.5 * period;
             write!(file, ",{:.4}", temperature.at(middle).gyro[0])?;
+        }
+        if let Some(mag) = &mut mag {
+            // Each value is in the row of its time; the other rows have none.
+            match mag.next_if(|(time, _)| *time < imu.time(k) + 0.5 * period) {
+                Some((_, v)) => write!(file, ",{:e},{:e},{:e}", v.x, v.y, v.z)?,
+                None => write!(file, ",,,")?,
+            }
         }
         writeln!(file)?;
     }
@@ -215,6 +228,11 @@ fn imu_file(run: &Run, output: Output) -> ImuFile {
         output,
         gyro_unit: Some(instrument.unit.gyro.clone()),
         accel_unit: Some(instrument.unit.accel.clone()),
+        mag_unit: run
+            .recording
+            .magnetometer
+            .as_ref()
+            .map(|of| of.unit.clone()),
         sample_period_s: Some(Positive(imu.period)),
         time_stamp: TimeStamp::Start,
         continuous: Some(imu.continuous),
@@ -222,6 +240,11 @@ fn imu_file(run: &Run, output: Output) -> ImuFile {
             time: Some(TimeColumn::One("t".to_owned())),
             gyro: names(["gx", "gy", "gz"]),
             accel: names(["ax", "ay", "az"]),
+            mag: run
+                .recording
+                .magnetometer
+                .as_ref()
+                .and_then(|_| names(["mx", "my", "mz"])),
             temperature: imu.temperature.as_ref().map(|_| temperature()),
         },
         noise: noise_fields(instrument),

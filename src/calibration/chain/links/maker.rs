@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::given::Given;
 use super::link::Link;
+use super::magnetic::magnetic;
 use super::rows::Rows;
 use super::transition::Transition;
 use crate::attitude::skew;
@@ -54,6 +55,7 @@ impl<'a, F: FnMut(Link) -> Result<(), CalibrationError>> Maker<'a, F> {
                 states,
                 constants,
                 turned: None,
+                magnetic: None,
             },
             pending: Transition::identity(states.count, constants.len()),
             take,
@@ -88,6 +90,7 @@ impl<'a, F: FnMut(Link) -> Result<(), CalibrationError>> Maker<'a, F> {
         let stretch = &problem.stretches()[number];
         let (prior, at) = (&script.priors[number], &script.at.initial_attitudes[number]);
         let start = stretch.start(prior, at);
+        self.dynamics.magnetic = script.at.magnetic;
         let before = number.checked_sub(1).map(|k| &problem.stretches()[k]);
         let same = before.filter(|before| before.recording == stretch.recording);
         if let Some(before) = same {
@@ -148,10 +151,21 @@ impl<'a, F: FnMut(Link) -> Result<(), CalibrationError>> Maker<'a, F> {
     }
 
     /// Resets some states, with these means and 1σ.
-    fn renew(&mut self, first: usize, (mean, sigma): (&[f64], &[f64]), effect: Effect) {
+    fn renew(&mut self, first: usize, of: (&[f64], &[f64]), effect: Effect) {
+        self.renew_at(self.dwell, first, of, effect);
+    }
+
+    /// Does the same for an event of this number.
+    fn renew_at(
+        &mut self,
+        event: usize,
+        first: usize,
+        (mean, sigma): (&[f64], &[f64]),
+        effect: Effect,
+    ) {
         self.pending.reset(first..first + mean.len(), mean);
         let root = DMatrix::from_diagonal(&DVector::from_column_slice(sigma));
-        self.pending.drive(effect, self.dwell, first, &root);
+        self.pending.drive(effect, event, first, &root);
     }
 
     /// Adds a move.
@@ -223,6 +237,14 @@ impl<'a, F: FnMut(Link) -> Result<(), CalibrationError>> Maker<'a, F> {
             Transition::identity(n, self.dynamics.constants.len()),
         );
         let rows = given.rows(&part).and(place);
+        let weight = model.weight(BudgetSource::MagneticNoise);
+        let rows = match magnetic(&self.dynamics, rest, weight) {
+            Some((magnetic, log_determinant)) => {
+                self.log_determinant += log_determinant;
+                magnetic.and(rows)
+            }
+            None => rows,
+        };
         if !rows.values.iter().all(|value| value.is_finite()) {
             return Err(diverged());
         }
@@ -244,6 +266,16 @@ impl<'a, F: FnMut(Link) -> Result<(), CalibrationError>> Maker<'a, F> {
             .map(|step| rest.models[step.model].duration);
         self.vary(duration.sum(), self.dwell - 1);
         Ok(())
+    }
+
+    /// Renews the disturbance of the magnetic field for the dwell that begins.
+    fn disturb_field(&mut self) {
+        if let Some(first) = self.dynamics.states.magnetic {
+            let model = &self.problem.model.magnetic;
+            let sigma = [model.disturbance / model.magnitude[0]; 3];
+            let effect = Effect::Noise(Source::MagneticDisturbance);
+            self.renew_at(self.dwell - 1, first, (&[0.0; 3], &sigma), effect);
+        }
     }
 
     /// Refers the states to the beginning of a part. If the body came to rest at a new position, the table position is
@@ -282,6 +314,7 @@ impl<'a, F: FnMut(Link) -> Result<(), CalibrationError>> Maker<'a, F> {
             let effect = Effect::Stated(BudgetSource::Pulses);
             self.pending.drive(effect, self.dwell - 1, turn, &root);
         }
+        self.disturb_field();
         if rest.new_position {
             if let Some(table) = states.table {
                 self.pending.reset(table..table + 3, &still);

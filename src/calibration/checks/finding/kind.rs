@@ -206,6 +206,25 @@ kinds! {
          term. The σ include the typical magnitude of this term. Add the moves listed in the finding, or state in \
          [imu.terms] that the instrument does not have the term: sigma = 0. `--with none` leaves out all terms."
         "U includes the typical magnitude of error terms that the recorded data cannot show."
+    FieldDisturbed = "W35" "field-disturbed" Note:
+        "In one dwell the magnetic field differs from the field in the other dwells by far more than usual. turncal gave \
+         the magnetometer next to no weight in this dwell. Look for steel, a magnet, a motor or a current near the \
+         place where the instrument was held."
+        "The magnetic field was disturbed in some positions, which have practically no weight in the results."
+    FieldVaries = "W36" "field-varies" Care:
+        "The magnetic field changes from dwell to dwell by more than 2 % of its magnitude, so it depends on the place \
+         where the instrument is held. The σ of the magnetometer include the change. Record outdoors, away from steel \
+         and currents, and keep the instrument at one place while you turn it."
+        "The magnetic field varied between the positions; U of the magnetometer includes the variation."
+    FieldUnlikely = "W37" "field-unlikely" Care:
+        "The inclination of the field at the site differs from that of the World Magnetic Model by more than its σ. A \
+         building or a vehicle then also changes the magnitude and direction of the field, so the scale factors of the \
+         magnetometer are less accurate than stated. Record outdoors, or leave out the date in [meta]."
+        "The magnetic field at the site was not that of the Earth; the scale of the magnetometer is less certain."
+    MagnetometerNotObserved = "W38" "magnetometer-not-observed" Partial:
+        "The dwells do not determine the magnetometer: at least five attitudes are needed whose field directions do not \
+         lie in one plane, and they must agree with one field. Add dwells with each axis up and down."
+        "The magnetometer was not calibrated, because the positions do not determine it."
 }
 
 impl Kind {

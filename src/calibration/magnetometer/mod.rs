@@ -1,0 +1,14 @@
+//! The magnetometer in the chain of dwells: prior, start, rows and estimate.
+
+mod alone;
+mod estimate;
+mod homogeneous;
+mod prior;
+mod start;
+#[cfg(test)]
+mod tests;
+
+pub use alone::{Alone, AtRest, Up, ellipsoid};
+pub use estimate::MagneticEstimate;
+pub use prior::MagneticPrior;
+pub use start::with_magnetometer;

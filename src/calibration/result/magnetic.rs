@@ -1,0 +1,142 @@
+//! The magnetometer in a calibration file.
+
+use nalgebra::{DMatrix, Matrix3, SVector};
+use serde::{Deserialize, Serialize};
+
+use crate::calibration::MagneticEstimate;
+use crate::magnetic::{MAGNETIC, MagneticTriad};
+use crate::recording::Magnetometer;
+use crate::units::DEGREE;
+
+/// The equation of a magnetometer.
+const EQUATION: &str = "N = matrix * field + bias; field = correction * (N - bias)";
+/// Number of constants of a magnetometer; the others are those of the field.
+const OF_TRIAD: usize = 12;
+
+/// A magnetometer in the body frame of the triads, in the quantity of the file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MagRecord {
+    /// Row by row: the file's quantity for a field of one `field.unit` along each body axis.
+    pub matrix: [[f64; 3]; 3],
+    /// Output without a field.
+    pub bias: [f64; 3],
+    /// Quantity of the file.
+    pub unit: String,
+    /// 1σ of matrix and bias; `None` for a truth.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigma: Option<MagSigma>,
+    /// Matrix of `field = correction (N − bias)`.
+    pub correction: [[f64; 3]; 3],
+    /// The field at the site.
+    pub field: FieldRecord,
+    /// Names of the estimated constants, such as `mag.matrix.xy`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub parameters: Vec<String>,
+    /// Covariance of these constants.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub covariance: Vec<Vec<f64>>,
+    /// The model in words.
+    pub equation: String,
+}
+
+/// 1σ of a magnetometer.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct MagSigma {
+    /// 1σ of each entry of the matrix.
+    pub matrix: [[f64; 3]; 3],
+    /// 1σ of the bias.
+    pub bias: [f64; 3],
+}
+
+/// The field at the site of a recording.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FieldRecord {
+    /// `T`, or `local field` if the magnitude is not known.
+    pub unit: String,
+    /// Magnitude, in `unit`.
+    pub magnitude: f64,
+    /// From North towards East. Without place and date, North is that of the field.
+    pub declination_deg: f64,
+    /// Below the horizon.
+    pub inclination_deg: f64,
+    /// 1σ of magnitude, declination and inclination; `None` for a truth.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigma: Option<[f64; 3]>,
+}
+
+impl MagRecord {
+    /// The record of a magnetometer in a field of this magnitude, T; `None` for a magnitude by convention.
+    pub fn new(triad: &MagneticTriad, magnitude: Option<f64>, log: &Magnetometer) -> Option<Self> {
+        let factor = log.nominal / magnitude.unwrap_or(1.0);
+        let matrix = triad.matrix * factor;
+        Some(Self {
+            matrix: rows(&matrix),
+            bias: (triad.bias * log.nominal).into(),
+            unit: log.unit.clone(),
+            sigma: None,
+            correction: rows(&matrix.try_inverse()?),
+            field: FieldRecord {
+                unit: magnitude.map_or("local field", |_| "T").to_owned(),
+                magnitude: magnitude.unwrap_or(1.0),
+                declination_deg: triad.angles.x / DEGREE,
+                inclination_deg: triad.angles.y / DEGREE,
+                sigma: None,
+            },
+            parameters: Vec::new(),
+            covariance: Vec::new(),
+            equation: EQUATION.to_owned(),
+        })
+    }
+
+    /// The record of an estimate, with its covariance.
+    pub fn of_estimate(estimate: &MagneticEstimate, log: &Magnetometer) -> Option<Self> {
+        let [magnitude, magnitude_sigma] = estimate.magnitude;
+        let known = (magnitude_sigma > 0.0).then_some(magnitude);
+        let mut record = Self::new(&estimate.triad, known, log)?;
+        let relative = known.map_or(0.0, |magnitude| magnitude_sigma / magnitude);
+        let unit = |k: usize| match k {
+            OF_TRIAD.. => 1.0 / DEGREE,
+            9.. => log.nominal,
+            _ => log.nominal / known.unwrap_or(1.0),
+        };
+        let unit = SVector::<f64, MAGNETIC>::from_fn(|k, _| unit(k));
+        let mut of_matrix = estimate.triad.vector().component_mul(&unit);
+        of_matrix.rows_range_mut(9..).fill(0.0);
+        // An error of the magnitude of the field scales the matrix.
+        let scaled = of_matrix * of_matrix.transpose() * relative.powi(2);
+        let covariance = DMatrix::from_fn(MAGNETIC, MAGNETIC, |i, j| {
+            estimate.covariance[(i, j)] * unit[i] * unit[j] + scaled[(i, j)]
+        });
+        let sigma = covariance.diagonal().map(|v| v.max(0.0).sqrt());
+        record.sigma = Some(MagSigma {
+            matrix: rows(&Matrix3::from_fn(|i, j| sigma[3 * i + j])),
+            bias: [sigma[9], sigma[10], sigma[11]],
+        });
+        record.field.sigma = Some([magnitude_sigma, sigma[OF_TRIAD], sigma[OF_TRIAD + 1]]);
+        record.parameters = (0..OF_TRIAD).map(MagneticTriad::name).collect();
+        let row = |i: usize| (0..OF_TRIAD).map(|j| covariance[(i, j)]).collect();
+        record.covariance = (0..OF_TRIAD).map(row).collect();
+        Some(record)
+    }
+
+    /// A value by name, such as `mag.matrix.xy`.
+    pub fn get(&self, name: &str) -> Option<&f64> {
+        named(name, &self.matrix, &self.bias)
+    }
+
+    /// 1σ of a value by name.
+    pub fn sigma_of(&self, name: &str) -> Option<&f64> {
+        let sigma = self.sigma.as_ref()?;
+        named(name, &sigma.matrix, &sigma.bias)
+    }
+}
+
+fn named<'a>(name: &str, matrix: &'a [[f64; 3]; 3], bias: &'a [f64; 3]) -> Option<&'a f64> {
+    let place = (0..OF_TRIAD).find(|&k| MagneticTriad::name(k) == name)?;
+    matrix.as_flattened().iter().chain(bias).nth(place)
+}
+
+/// A matrix row by row.
+fn rows(matrix: &Matrix3<f64>) -> [[f64; 3]; 3] {
+    matrix.transpose().data.0
+}
