@@ -1,6 +1,6 @@
 //! Builds the page: one HTML file with style, program, worker and the engine as compressed WebAssembly.
 //!
-//! Usage: page [FILE], by default `target/web/turncal.html`.
+//! Usage: `page [FILE]`, by default `target/web/turncal.html`.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};

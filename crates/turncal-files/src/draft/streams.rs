@@ -430,7 +430,7 @@ fn tagged(file: &DataFile) -> Result<Vec<Member>, FileError> {
                     "several instruments in the rows `{tag}`, distinguished by the column `{name}`"
                 ),
                 "the rows of one instrument",
-                &format!(
+                format!(
                     "Keep only the rows of one instrument, such as those with {name} = {number}."
                 ),
             ));
