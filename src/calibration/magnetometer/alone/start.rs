@@ -17,6 +17,9 @@ pub fn ellipsoid(rests: &[AtRest], with_gravity: bool) -> Option<MagneticTriad> 
         .iter()
         .map(|of| (of.mean.output - middle).norm_squared());
     let size = (squares.sum::<f64>() / count).sqrt();
+    if size.is_nan() || size <= 0.0 {
+        return None;
+    }
     let values: Vec<Vector3<f64>> = rests
         .iter()
         .map(|of| (of.mean.output - middle) / size)
@@ -83,9 +86,11 @@ fn turned(fields: &[Vector3<f64>], rests: &[AtRest]) -> Option<(Matrix3<f64>, f6
 
 /// Linear least squares; `None` if the rows do not determine the solution.
 fn least_squares(rows: DMatrix<f64>, values: &DVector<f64>) -> Option<DVector<f64>> {
-    let is_enough = rows.nrows() >= rows.ncols();
+    if rows.nrows() < rows.ncols() {
+        return None;
+    }
     let svd = rows.svd(true, true);
     let [least, largest] = [svd.singular_values.min(), svd.singular_values.max()];
-    let is_determined = is_enough && least > DETERMINED * largest;
+    let is_determined = least > DETERMINED * largest;
     is_determined.then(|| svd.solve(values, 0.0).ok()).flatten()
 }
