@@ -1,10 +1,13 @@
 //! The magnetometer from files to calibration.json.
 
+use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::fs;
 use std::path::Path;
 
+use crate::export::{numbers, record, text_of};
 use nalgebra::{Matrix3, Vector3};
+use turncal::calibration::result::{Calibration, FieldRecord, MagRecord};
 use turncal::calibration::{Method, Options, Problem, UNWATCHED};
 use turncal::magnetic::LocalField;
 use turncal::recording::Magnetometer;
@@ -132,7 +135,6 @@ fn calibration_json_corrects_the_output_to_the_field_and_older_readers_find_what
     let read = read_calibration(&path).unwrap();
     assert_eq!(read.mag, record.mag);
     let mag = read.mag.as_ref().unwrap();
-    let matrix = |rows: [[f64; 3]; 3]| Matrix3::from_fn(|i, j| rows[i][j]);
     let correction = matrix(mag.correction);
     let truth = made.truth_record().mag.unwrap();
     // Output in a field of 50 µT along body y, by the truth.
@@ -156,4 +158,162 @@ fn calibration_json_corrects_the_output_to_the_field_and_older_readers_find_what
     // The budget names what the magnetometer adds.
     let sources = &read.budget.as_ref().unwrap().sources;
     assert!(!sources.is_empty());
+}
+
+/// Body axes right, front, up, along front, right, down.
+const FROM_FRD: [[f64; 3]; 3] = [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]];
+
+fn matrix(rows: [[f64; 3]; 3]) -> Matrix3<f64> {
+    Matrix3::from_fn(|i, j| rows[i][j])
+}
+
+/// A calibration with a magnetometer whose axes are front, right, down, with this output per field, in `unit`.
+fn with_magnetometer(sensitivity: Matrix3<f64>, bias: [f64; 3], unit: &str) -> Calibration {
+    let of_body = sensitivity * matrix(FROM_FRD).transpose();
+    let rows = |of: Matrix3<f64>| of.transpose().data.0;
+    Calibration {
+        mag: Some(MagRecord {
+            matrix: rows(of_body),
+            bias,
+            unit: unit.to_owned(),
+            sigma: None,
+            correction: rows(of_body.try_inverse().unwrap()),
+            field: FieldRecord {
+                unit: "T".to_owned(),
+                magnitude: 48e-6,
+                declination_deg: 3.0,
+                inclination_deg: 64.0,
+                sigma: None,
+            },
+            parameters: Vec::new(),
+            covariance: Vec::new(),
+            equation: String::new(),
+        }),
+        ..record()
+    }
+}
+
+/// Parameters by their names.
+fn parameters(text: &str) -> BTreeMap<String, f64> {
+    let lines = text.lines().filter(|line| !line.starts_with('#'));
+    let words = lines.map(|line| {
+        let separators = ['\t', ',', ' ', '='];
+        let words = line.split(separators).filter(|word| !word.is_empty());
+        words.map(str::to_owned).collect::<Vec<_>>()
+    });
+    let pair = |words: Vec<String>| {
+        let of_px4 = words.first().is_some_and(|word| word == "1");
+        let skip = if of_px4 || words.first().is_some_and(|word| word == "set") {
+            words.iter().position(|word| word.len() > 3)?
+        } else {
+            0
+        };
+        Some((words[skip].clone(), words.get(skip + 1)?.parse().ok()?))
+    };
+    words.filter_map(pair).collect()
+}
+
+/// Twenty fields along front, right, down, T.
+fn fields() -> impl Iterator<Item = Vector3<f64>> {
+    (0..20).map(|k| {
+        let (angle, up) = (2.4 * f64::from(k), f64::from(k) / 10.0 - 0.95);
+        let level = (1.0 - up * up).sqrt();
+        48e-6 * Vector3::new(level * angle.cos(), level * angle.sin(), up)
+    })
+}
+
+#[test]
+fn autopilots_compute_the_field_from_the_parameters_of_their_files() {
+    // Only a symmetric matrix is within reach of the parameters.
+    let sensitivity =
+        1e6 * Matrix3::new(1.04, 0.02, -0.013, 0.02, 0.97, 0.031, -0.013, 0.031, 1.01);
+    let bias = [12.0, -31.0, 7.5];
+    let record = with_magnetometer(sensitivity, bias, "uT");
+    let symmetric = |of: &BTreeMap<String, f64>, [d, o]: [&str; 2]| {
+        let value = |name: &str, axis: &str| of[&name.replace('#', axis)];
+        let [x, y, z] = ["X", "Y", "Z"].map(|axis| value(o, axis));
+        let mut all = Matrix3::new(0.0, x, y, x, 0.0, z, y, z, 0.0);
+        all.set_diagonal(&["X", "Y", "Z"].map(|axis| value(d, axis)).into());
+        all
+    };
+    let offset = |of: &BTreeMap<String, f64>, name: &str| {
+        Vector3::from(["X", "Y", "Z"].map(|axis| of[&name.replace('#', axis)]))
+    };
+    let px4 = parameters(&text_of(&record, "px4", None).0);
+    let ardupilot = parameters(&text_of(&record, "ardupilot", None).0);
+    for field in fields() {
+        let raw = sensitivity * field + Vector3::from(bias);
+        let gauss = symmetric(&px4, ["CAL_MAG0_#SCALE", "CAL_MAG0_#ODIAG"])
+            * (raw / 100.0 - offset(&px4, "CAL_MAG0_#OFF"));
+        assert!(
+            (gauss - field * 1e4).norm() < 1e-6 * field.norm() * 1e4,
+            "{gauss}"
+        );
+        let milligauss = symmetric(&ardupilot, ["COMPASS_DIA_#", "COMPASS_ODI_#"])
+            * (raw * 10.0 + offset(&ardupilot, "COMPASS_OFS_#"));
+        assert!((milligauss - field * 1e7).norm() < 1e-6 * field.norm() * 1e7);
+    }
+}
+
+#[test]
+fn counts_and_whole_matrices_go_where_a_program_takes_them() {
+    let sensitivity = Matrix3::from_diagonal(&Vector3::new(5.2e6, 4.8e6, 5.0e6));
+    let bias = [140.0, -260.0, 35.0];
+    // Without a run, the axes of the log are right, front, up.
+    let record = with_magnetometer(sensitivity * matrix(FROM_FRD), bias, "count");
+    let inav = parameters(&text_of(&record, "inav", None).0);
+    let axes =
+        |name: &str| Vector3::from(["x", "y", "z"].map(|axis| inav[&format!("{name}_{axis}")]));
+    let gain = axes("maggain");
+    for field in fields() {
+        let raw = sensitivity * field + Vector3::from(bias);
+        let found = (raw - axes("magzero")) * 1024.0;
+        let found = found.component_div(&gain);
+        // Whole numbers: half a count of 240, half a step of a gain of 1000.
+        assert!(
+            (found.normalize() - field.normalize()).norm() < 5e-3,
+            "{found}"
+        );
+    }
+    let betaflight = text_of(&record, "betaflight", None).0;
+    assert!(
+        betaflight.contains("set mag_calibration = 140,-260,35\n"),
+        "{betaflight}"
+    );
+    let notes = text_of(&record, "px4", None).1;
+    assert!(
+        notes.iter().any(|note| note.contains("counts")),
+        "{notes:?}"
+    );
+    let full = Matrix3::new(1.1e6, 4e4, -2e4, 9e4, 0.9e6, 3e4, 1e4, 5e4, 1e6);
+    let record = with_magnetometer(full, bias, "uT");
+    let text = text_of(&record, "c", None).0;
+    let after = |name: &str, count: usize| {
+        let rest = text.split_once(name).unwrap().1.split_once('=').unwrap().1;
+        numbers(rest.split_once(';').unwrap().0)[..count].to_vec()
+    };
+    let correction = Matrix3::from_row_slice(&after("turncal_mag_correction", 9));
+    let zero = Vector3::from_row_slice(&after("turncal_mag_bias", 3));
+    let madgwick = parameters(
+        &text_of(&record, "imu-filter-madgwick", None)
+            .0
+            .replace(':', ""),
+    );
+    for field in fields() {
+        let raw = full * field + Vector3::from(bias);
+        let found = matrix(FROM_FRD).transpose() * (correction * (raw - zero));
+        assert!((found - field).norm() < 1e-12);
+    }
+    for (axis, value) in ["x", "y", "z"].into_iter().zip(bias) {
+        assert!((madgwick[&format!("mag_bias_{axis}")] - value * 1e-6).abs() < 1e-12);
+    }
+    // An axis order that the parameters cannot hold is told.
+    let turned = full * matrix([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]);
+    let (text, notes) = text_of(&with_magnetometer(turned, bias, "uT"), "px4", None);
+    assert!(!text.contains("CAL_MAG0_XOFF"));
+    assert!(
+        notes
+            .iter()
+            .any(|note| note.contains("in the order of the gyro columns"))
+    );
 }

@@ -1,11 +1,12 @@
 //! Units: names in `run.toml`, sizes, and spellings in files.
 
-use Of::{Count, Other, Rows, Time};
+use Of::{Count, Field, Other, Rows, Time};
 use Output::{Increment, Rate};
 use Sensor::{Accel, Gyro};
 
 use turncal::imu::{Output, Sensor};
 use turncal::noise::normalised;
+use turncal::recording::MAGNETIC_COUNT;
 use turncal::units::{ARCSEC, DEG_PER_H, DEGREE, STANDARD_GRAVITY};
 
 /// Quantities of a row.
@@ -19,6 +20,8 @@ pub enum Of {
     /// A count, of any quantity.
     Count,
     Time,
+    /// Magnetic flux density.
+    Field,
     Other,
 }
 
@@ -26,7 +29,7 @@ pub enum Of {
 type Row = (&'static str, Of, f64, &'static [&'static str]);
 
 #[rustfmt::skip]
-const UNITS: [Row; 22] = [
+const UNITS: [Row; 26] = [
     ("count", Count, f64::NAN, &["count", "counts", "lsb", "raw", "cnt"]),
     ("rad/s", Rows(Gyro, Rate), 1.0, &["rad/s", "rads-1", "rads", "radps", "rps", "radpersec"]),
     ("deg/s", Rows(Gyro, Rate), 1.0 / DEGREE, &["deg/s", "degs-1", "degs", "degps", "degpersec"]),
@@ -45,8 +48,12 @@ const UNITS: [Row; 22] = [
     ("us", Time, 1e6, &["us", "usec", "usecs", "micros", "microseconds"]),
     ("ns", Time, 1e9, &["ns", "nsec", "nsecs", "nanos", "nanosec", "nanoseconds"]),
     ("degC", Other, 1.0, &["degc", "celsius"]),
-    ("uT", Other, 1e6, &["ut", "microtesla"]),
-    ("gauss", Other, 1e4, &["gauss"]),
+    ("uT", Field, 1e6, &["ut", "microtesla"]),
+    ("nT", Field, 1e9, &["nt", "nanotesla"]),
+    ("mT", Field, 1e3, &["mt", "millitesla"]),
+    ("T", Field, 1.0, &["tesla"]),
+    ("G", Field, 1e4, &["gauss", "gs"]),
+    ("mG", Field, 1e7, &["mgauss", "milligauss"]),
     ("hPa", Other, 1e-2, &["hpa", "mbar"]),
     ("Pa", Other, 1.0, &["pa"]),
 ];
@@ -69,6 +76,13 @@ pub fn units(sensor: Sensor, output: Output) -> impl Iterator<Item = (&'static s
     let usable = move |row: &&Row| row.1 == Count || row.1 == Rows(sensor, output);
     let scaled = |&(word, of, per_si, _): &Row| (word, (of != Count).then_some(per_si));
     UNITS.iter().filter(usable).map(scaled)
+}
+
+/// Units of a magnetometer, with their number per tesla.
+pub fn units_of_field() -> impl Iterator<Item = (&'static str, f64)> {
+    let of_field = UNITS.iter().filter(|row| row.1 == Field);
+    let scaled = of_field.map(|&(word, _, per_si, _)| (word, per_si));
+    scaled.chain([("count", MAGNETIC_COUNT)])
 }
 
 /// Units of time in s.

@@ -24,6 +24,8 @@ pub fn document(at_rest: &AtRest, run: &Run, calibration: &Calibration) -> Docum
     document.verdict = values::verdict(calibration);
     document.findings = in_order(&calibration.findings);
     document.brief.push(values::table(calibration).into());
+    let magnetometer = values::magnetometer(calibration);
+    document.brief.extend(magnetometer.map(Into::into));
     document.brief.push(orders(outputs.form(), thermal).into());
     document.both(hysteresis(outputs.form(), thermal));
     let changes = |index: usize| {

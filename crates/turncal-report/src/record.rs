@@ -14,6 +14,8 @@ pub fn document(calibration: &Calibration, name: &str) -> Document {
     document.lead.extend(origin(calibration));
     document.findings = in_order(&calibration.findings);
     document.brief.push(values::table(calibration).into());
+    let magnetometer = values::magnetometer(calibration);
+    document.brief.extend(magnetometer.map(Into::into));
     document.brief.push(facts(calibration).into());
     document.both(parameters(calibration));
     document.both(noise(calibration));

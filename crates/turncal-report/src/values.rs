@@ -6,6 +6,8 @@ use turncal::imu::{AXES, Sensor};
 
 /// The unit of raw numbers; for these, a scale factor relative to the nominal one is of little use.
 const RAW: &str = "count";
+/// One microtesla, T.
+const MICRO_TESLA: f64 = 1e-6;
 
 /// One row per axis.
 pub fn table(calibration: &Calibration) -> Table {
@@ -32,6 +34,36 @@ pub fn table(calibration: &Calibration) -> Table {
     table.note(format!(
         "In parentheses: 1σ in units of the last digit. K: {scale}; D: °/h and µg."
     ))
+}
+
+/// The magnetometer: one row per axis, if it was calibrated.
+pub fn magnetometer(calibration: &Calibration) -> Option<Table> {
+    let mag = calibration.mag.as_ref()?;
+    let (per, size) = match &*mag.field.unit {
+        "T" => ("µT", MICRO_TESLA),
+        other => (other, 1.0),
+    };
+    let with_sigma = |name: &str, size: f64| {
+        let value = mag.get(name)?;
+        Some(match mag.sigma_of(name) {
+            Some(sigma) => with_last_digits(value / size, sigma / size),
+            None => three_digits(value / size),
+        })
+    };
+    let rows = AXES.map(|axis| {
+        let of_matrix = AXES.map(|to| with_sigma(&format!("mag.matrix.{axis}{to}"), 1.0 / size));
+        let bias = with_sigma(&format!("mag.bias.{axis}"), 1.0);
+        let values = of_matrix.into_iter().chain([bias]);
+        let values = values.map(|value| value.unwrap_or_else(|| NONE.to_owned()));
+        std::iter::once(format!("mag    {axis}")).chain(values)
+    });
+    let columns = ["", "to x", "to y", "to z", "hard iron"];
+    let rows = rows.map(|row| row.collect::<Vec<_>>());
+    let table = Table::new("", columns).section(rows);
+    Some(table.note(format!(
+        "In parentheses: 1σ in units of the last digit. Matrix: {} per {per}; hard iron: {}.",
+        mag.unit, mag.unit
+    )))
 }
 
 fn unit(calibration: &Calibration, sensor: Sensor) -> Option<&str> {

@@ -267,11 +267,11 @@ impl Study {
     }
 }
 
-/// By hand and on a table, two sensors, clean and disturbed: `MAG_RUNS` runs each, 100 by default.
+/// By hand and on a table, two sensors, clean and disturbed: `MAG_RUNS` runs each, 20 by default.
 #[test]
 #[ignore = "statistical"]
 fn sigma_are_true_and_errors_at_the_bound_over_many_runs() {
-    let runs = std::env::var("MAG_RUNS").map_or(100, |runs| runs.parse().unwrap());
+    let runs = std::env::var("MAG_RUNS").map_or(20, |runs| runs.parse().unwrap());
     let mut wrong = Vec::new();
     for (name, hand, other, disturbance) in [
         ("by hand", true, false, 0.0),

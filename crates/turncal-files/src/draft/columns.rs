@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 
+use super::magnetometer::MagnetometerColumns;
 use super::name::Name;
 use super::stated::StatedColumns;
 use super::triads::{Doubt, Identified, Triad, consecutive, is_uneven, overlap};
@@ -24,6 +25,7 @@ pub struct Columns {
     /// Reasons why triads that were identified by their values are only a guess.
     pub doubt: Option<Doubt>,
     pub temperature: Option<usize>,
+    pub magnetometer: Option<MagnetometerColumns>,
     /// Four columns that form a quaternion, because their norm is one.
     pub quaternion: Option<[usize; 4]>,
 }
@@ -94,6 +96,7 @@ impl Columns {
             by_size: Sensor::ALL.iter().any(is_new),
             doubt,
             temperature,
+            magnetometer: MagnetometerColumns::find(sheet, &names),
             quaternion,
         }
     }
@@ -186,7 +189,7 @@ pub fn have_rows_of_their_own(sheet: &Sheet) -> bool {
 }
 
 /// Whether a column has two different numbers.
-fn varies(values: &[f64]) -> bool {
+pub fn varies(values: &[f64]) -> bool {
     let mut values = values.iter().filter(|value| value.is_finite());
     let first = values.next();
     first.is_some_and(|first| values.any(|value| value != first))
@@ -370,7 +373,7 @@ fn candidates(
     PerSensor::from_fn(|sensor| {
         let is_of = |k: usize| match names[k].unit.map(|unit| unit.of) {
             Some(Of::Rows(of_unit, _)) => of_unit == sensor,
-            Some(Of::Time | Of::Other) => false,
+            Some(Of::Time | Of::Field | Of::Other) => false,
             Some(Of::Count) | None => true,
         };
         match &by_name.get(sensor)[..] {

@@ -4,6 +4,7 @@
 mod columns;
 mod convert;
 mod found;
+mod magnetometer;
 mod motion;
 mod name;
 mod priors;

@@ -28,8 +28,9 @@ const TRIADS: [(Sensor, &[&str], &[&str]); 2] = [
 ];
 /// Parts of the names of other columns.
 #[rustfmt::skip]
-const OTHERS: [&str; 10] =
-    ["mag", "compass", "quat", "euler", "cov", "std", "bias", "orientation", "useracc", "gravity"];
+const OTHERS: [&str; 8] = ["quat", "euler", "cov", "std", "bias", "orientation", "useracc", "gravity"];
+/// Parts of the names of magnetometer columns.
+const MAGNETOMETERS: [&str; 2] = ["mag", "compass"];
 
 /// A parsed name.
 #[derive(Debug, Clone, PartialEq)]
@@ -154,8 +155,16 @@ impl Name {
 
     /// Whether the name belongs to neither a gyro nor an accelerometer.
     pub fn is_of_another_sensor(&self) -> bool {
-        let is_magnetic = |unit: Unit| ["uT", "gauss"].contains(&unit.word);
-        self.unit.is_some_and(is_magnetic) || OTHERS.iter().any(|other| self.stem.contains(other))
+        self.is_magnetic() || OTHERS.iter().any(|other| self.stem.contains(other))
+    }
+
+    /// Whether the name belongs to an axis of a magnetometer.
+    pub fn is_magnetic(&self) -> bool {
+        let is_of_field = self.unit.is_some_and(|unit| unit.of == Of::Field);
+        let is_named = MAGNETOMETERS.iter().any(|part| self.stem.contains(part))
+            && !OTHERS.iter().any(|other| self.stem.contains(other));
+        let is_letter = self.stem == "m" && matches!(self.axis, Some('x' | 'y' | 'z'));
+        is_of_field || is_named || is_letter
     }
 
     /// How similar the name is to the typical name of a time column; larger means more similar.

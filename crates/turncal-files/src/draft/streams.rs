@@ -1,6 +1,7 @@
 //! Selects the streams or files that contain the data of the instrument.
 
 use super::columns::{self, Columns, by_stem};
+use super::magnetometer::MagnetometerColumns;
 use super::name::Name;
 use super::time;
 use super::triads::{Triad, uneven};
@@ -8,7 +9,7 @@ use crate::Sheet;
 use crate::joined;
 use crate::joined::Part;
 use crate::schema::page::Remarks;
-use crate::schema::{AccelFromFile, ImuFile, TimeColumn, TimeUnitField};
+use crate::schema::{AccelFromFile, ImuFile, Names, TimeColumn, TimeUnitField};
 use turncal::imu::{AXES, Output, PerSensor, Sensor};
 use turncal_input::{FileError, choice, list, suggestion};
 use turncal_logs::clock::{Breaks, Clock, TimeUnit};
@@ -29,6 +30,8 @@ pub struct Streams {
     pub time: Option<PerSensor<(String, String)>>,
     /// Column names in the log.
     pub names: Vec<String>,
+    /// A magnetometer in a stream of its own.
+    pub magnetometer: Option<MagnetometerStream>,
     remarks: Vec<String>,
     /// Body axes used by the program that wrote the log.
     pub axes: Option<&'static str>,
@@ -36,6 +39,16 @@ pub struct Streams {
     pub damage: Option<FileError>,
     /// The accelerometer file, if both triads are in text files.
     pub written: Option<Written>,
+}
+
+/// A magnetometer in a stream of its own.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MagnetometerStream {
+    stream: String,
+    names: [String; 3],
+    /// Time column and its unit.
+    time: (String, String),
+    found: MagnetometerColumns,
 }
 
 /// Text files written from a log.
@@ -116,6 +129,10 @@ impl Streams {
             }
         };
         streams.listed = listed(&members);
+        let others = members
+            .iter()
+            .filter(|of| of.found.stream.name != streams.gyro);
+        streams.magnetometer = others.filter_map(|of| of.magnetometer(salvage)).next();
         streams.damage = damage;
         Ok(Some((streams, sheet)))
     }
@@ -187,6 +204,7 @@ impl Streams {
             accel: accel.map(|accel| accel.found.stream.name.clone()),
             time: None,
             names: columns.map(|column| column.name.clone()).collect(),
+            magnetometer: None,
             remarks: remarks.map(|remark| one_line(remark)).collect(),
             axes: gyro.found.stream.axes,
             damage: None,
@@ -220,6 +238,18 @@ impl Streams {
             }
             let why = "the accelerometers have their own clock; --with time-offset estimates the difference";
             remarks.reason("imu.accel_from", why);
+        }
+        if let Some(of) = &self.magnetometer {
+            let (time, unit) = &of.time;
+            imu.columns.mag = Some(Names(of.names.clone()));
+            imu.mag_unit = Some(of.found.unit.to_owned());
+            imu.mag_from = Some(AccelFromFile {
+                stream: Some(of.stream.clone()),
+                time: Some(TimeColumn::One(time.clone())),
+                time_unit: Some(TimeUnitField::of_text(unit)),
+                ..AccelFromFile::default()
+            });
+            remarks.reason("imu.mag_unit", of.found.why);
         }
         for remark in &self.remarks {
             remarks.before("imu.salvage", remark);
@@ -306,6 +336,25 @@ impl Member {
         let found = format_args!("the columns {columns}");
         let advice = "Rename the columns or the file, or complete the fields by hand.";
         FileError::of(&self.file, found, expected, advice)
+    }
+
+    /// The magnetometer, if the stream has one and can be read.
+    fn magnetometer(&self, salvage: bool) -> Option<MagnetometerStream> {
+        let names: Vec<Name> = names(&self.found)
+            .iter()
+            .map(|name| Name::of(name))
+            .collect();
+        names.iter().find(|name| name.is_magnetic())?;
+        let source = self.source(salvage);
+        let sheet = Sheet::of(source.open().ok()?, FEWEST_ROWS).ok()?;
+        let found = MagnetometerColumns::find(&sheet, &names)?;
+        let name = |k: usize| self.found.stream.columns[k].name.clone();
+        Some(MagnetometerStream {
+            stream: self.found.stream.name.clone(),
+            names: found.columns.map(name),
+            time: self.time_by(&source).ok()?,
+            found,
+        })
     }
 
     /// The names of a triad's columns.

@@ -81,6 +81,7 @@ impl Draft {
 
     fn imu(&self, file: &str, remarks: &mut Remarks) -> ImuFile {
         let (found, clock) = (&self.quantities, &self.clock);
+        let magnetometer = self.columns.magnetometer.as_ref();
         let mut imu = ImuFile {
             file: file.to_owned(),
             output: found.output,
@@ -99,10 +100,14 @@ impl Draft {
                 number: Finite(number),
             }),
             columns: self.columns(remarks),
+            mag_unit: magnetometer.map(|of| of.unit.to_owned()),
             noise: self.noise_fields(remarks),
             prior: self.priors(remarks),
             ..ImuFile::default()
         };
+        if let Some(of) = magnetometer {
+            remarks.reason("imu.mag_unit", of.why);
+        }
         if let Some(streams) = &self.streams {
             streams.describe(&mut imu, remarks);
         }
@@ -265,7 +270,7 @@ impl Draft {
             time,
             gyro: names(columns.triads.gyro),
             accel: names(columns.triads.accel),
-            mag: None,
+            mag: names(columns.magnetometer.as_ref().map(|of| of.columns)),
             temperature: (columns.temperature).map(|k| TemperatureColumn::One(self.name(k))),
         }
     }

@@ -3,15 +3,20 @@
 //! PX4 and ArduPilot compute `(n − offset) ⊙ scale` for accelerometers and `n − offset` for gyros, in sensor axes, and
 //! then rotate to body axes (`SENS_BOARD_ROT`, `AHRS_ORIENTATION`). INAV and Betaflight do the same in whole counts.
 //!
+//! Magnetometers: PX4 and ArduPilot multiply by a symmetric matrix, and ArduPilot adds its offsets; INAV computes
+//! `(counts − magzero) 1024 / maggain`; Betaflight only subtracts `mag_calibration`.
+//!
 //! Source: PX4-Autopilot, `src/lib/sensor_calibration` and `src/modules/temperature_compensation`; ArduPilot,
 //! `AP_InertialSensor_Backend.cpp`, `_rotate_and_correct_accel`, and `AP_InertialSensor_tempcal.cpp`, `correct_sensor`;
 //! Betaflight, `acceleration.c`, `applyAccelerationTrims`; INAV, `acceleration.c`, `applyAccelerationZero`, and
 //! `gyro.c`, `gyro_zero_x`. PX4 skips thermal parameters whose `TC_G0_ID` or `TC_A0_ID` is not the identity of the
-//! device: `TemperatureCompensation::set_sensor_id`.
+//! device: `TemperatureCompensation::set_sensor_id`. Magnetometers: PX4-Autopilot, `sensor_calibration/Magnetometer.hpp`;
+//! ArduPilot, `AP_Compass_Backend.cpp`, `correct_field`; INAV and Betaflight, `compass.c`, `compassUpdate`.
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use super::affine::Affine;
+use super::compass::{Compass, Reads, compass};
 use super::remarks::{Exported, Remarks};
 use super::values::Values;
 use turncal::imu::{AXES, PerSensor, Sensor};
@@ -28,6 +33,12 @@ const COUNTS_PER_G: f64 = 2048.0;
 const COUNTS_PER_RAD_S: f64 = 16.4 / DEGREE;
 /// Unit gain in INAV.
 const INAV_ONE: f64 = 4096.0;
+
+/// Quantity of the magnetometers per tesla.
+const GAUSS: f64 = 1e4;
+const MILLIGAUSS: f64 = 1e7;
+/// Unit gain of a magnetometer in INAV.
+const INAV_COMPASS: f64 = 1024.0;
 
 /// Names with values.
 type Parameters = Vec<(String, f64)>;
@@ -54,6 +65,29 @@ fn parameters(program: &PerSensor<Affine>, [gyro, offset, scale]: [&str; 3]) -> 
     gyros.chain(accel).collect()
 }
 
+/// Parameters of the magnetometer: offsets times `sign`, diagonal and other entries of its matrix; and what they omit.
+fn of_compass(
+    values: &Values,
+    (reads, sign): (Reads, f64),
+    [offset, scale, off_diagonal]: [&str; 3],
+) -> (Parameters, Option<String>) {
+    let found = match compass(values, reads) {
+        None => return (Vec::new(), None),
+        Some(Err(why)) => return (Vec::new(), Some(format!("magnetometer: {why}"))),
+        Some(Ok(found)) => found,
+    };
+    let all = [
+        (offset, found.offset * sign),
+        (scale, found.matrix.diagonal()),
+        (off_diagonal, found.off_diagonal()),
+    ];
+    let axes = |(name, values): (&str, Vector3<f64>)| {
+        [0, 1, 2].map(|k| (name.replace('#', UPPER[k]), values[k]))
+    };
+    let parameters = all.into_iter().flat_map(axes).collect();
+    (parameters, Some(found.residual(&found.matrix)))
+}
+
 /// Vehicle, component, name, value, type (9: 32-bit floating point, 6: integer).
 fn px4_lines(parameters: Parameters) -> String {
     let line = |(name, value): (String, f64)| format!("1\t1\t{name}\t{:?}\t9\n", value as f32);
@@ -65,6 +99,11 @@ pub fn px4(values: &Values) -> Exported {
     let program = single(values);
     let names = ["CAL_GYRO0_#OFF", "CAL_ACC0_#OFF", "CAL_ACC0_#SCALE"];
     let mut text = px4_lines(parameters(&program, names));
+    let names = ["CAL_MAG0_#OFF", "CAL_MAG0_#SCALE", "CAL_MAG0_#ODIAG"];
+    let (compass, of_compass) = of_compass(values, (Reads::Field(GAUSS), 1.0), names);
+    let id = "CAL_MAG0_ID: set it to the device_id that `listener sensor_mag` shows";
+    let of_id = (!compass.is_empty()).then(|| id.to_owned());
+    text += &px4_lines(compass);
     // PX4 compares the identities with those of its drivers, which no log of samples holds.
     let thermal = values.record.temperature.iter();
     let ids = match &values.record.temperature {
@@ -94,7 +133,9 @@ pub fn px4(values: &Values) -> Exported {
         text += &format!("1\t1\t{all}_ENABLE\t1\t6\n");
     }
     let reads = ("#", "PX4 reads rad/s and m/s^2");
-    Remarks::of_program(values, reads, &program, &[UNCORRECTED, &ids]).above(&text)
+    Remarks::of_program(values, reads, &program, &[UNCORRECTED, &ids])
+        .omitting(of_compass.into_iter().chain(of_id))
+        .above(&text)
 }
 
 /// Temperature correction of ArduPilot: `n − p(T) + p(T_cal)` before the offsets are subtracted, with `p(T) = (c₁ d +
@@ -112,6 +153,9 @@ pub fn ardupilot(values: &Values) -> Exported {
     };
     let names = ["INS_GYROFFS_#", "INS_ACCOFFS_#", "INS_ACCSCAL_#"];
     let mut text = lines(parameters(&program, names));
+    let names = ["COMPASS_OFS_#", "COMPASS_DIA_#", "COMPASS_ODI_#"];
+    let (compass, of_compass) = of_compass(values, (Reads::Field(MILLIGAUSS), -1.0), names);
+    text += &lines(compass);
     if let Some(thermal) = &values.record.temperature {
         let range = thermal.range.gyro;
         let mut parameters = vec![
@@ -134,7 +178,9 @@ pub fn ardupilot(values: &Values) -> Exported {
         text += &lines(parameters);
     }
     let reads = ("#", "ArduPilot reads rad/s and m/s^2");
-    Remarks::of_program(values, reads, &program, &notes).above(&text)
+    Remarks::of_program(values, reads, &program, &notes)
+        .omitting(of_compass)
+        .above(&text)
 }
 
 /// A vector rounded to whole counts.
@@ -162,14 +208,31 @@ pub fn betaflight(values: &Values) -> Exported {
         "#",
         "commands for the Betaflight command line, computed from rad/s and m/s^2",
     );
-    let [x, y, z] = [zero.x, zero.y, zero.z].map(|count| count as i64);
+    let line = |key: &str, zero: Vector3<f64>, end: &str| {
+        let [x, y, z] = [zero.x, zero.y, zero.z].map(|count| count as i64);
+        format!("set {key} = {x},{y},{z}{end}\n")
+    };
+    let (compass, of_compass) = counted_compass(values);
+    let compass = compass.map(|of| (of.offset.map(f64::round), of.residual(&Matrix3::identity())));
+    let (compass, residual) = compass.unzip();
+    let compass = compass.map(|zero| line("mag_calibration", zero, ""));
     Remarks::of_program(values, reads, &program, &notes)
         .defines([
             of_counts("an accelerometer", COUNTS_PER_G, "g"),
             "these values are for a log recorded with acc_calibration = 0,0,0,0, because Betaflight subtracts \
              acc_calibration before logging".to_owned(),
         ])
-        .above(&format!("set acc_calibration = {x},{y},{z},1\nsave\n"))
+        .omitting(of_compass.or(residual))
+        .above(&(line("acc_calibration", zero, ",1") + &compass.unwrap_or_default() + "save\n"))
+}
+
+/// The magnetometer of a program that reads counts; or the reason why there is none.
+fn counted_compass(values: &Values) -> (Option<Compass>, Option<String>) {
+    match compass(values, Reads::Counts) {
+        None => (None, None),
+        Some(Err(why)) => (None, Some(format!("magnetometer: {why}"))),
+        Some(Ok(found)) => (Some(found), None),
+    }
 }
 
 /// INAV computes `(counts − acczero) accgain / 4096` for accelerometers; INAV uses the gyro zeros unless it estimates
@@ -193,12 +256,25 @@ pub fn inav(values: &Values) -> Exported {
         ("accgain", &gain),
         ("gyro_zero", &gyro_zero),
     ];
-    let text = all.map(|(name, values)| set(name, values)).concat();
+    let mut text = all.map(|(name, values)| set(name, values)).concat();
+    let (compass, of_compass) = counted_compass(values);
+    let compass = compass.map(|of| {
+        let gain = of
+            .matrix
+            .diagonal()
+            .map(|factor| (INAV_COMPASS / factor).round());
+        text += &set("magzero", &of.offset.map(f64::round));
+        text += &set("maggain", &gain);
+        of.residual(&Matrix3::from_diagonal(
+            &gain.map(|gain| INAV_COMPASS / gain),
+        ))
+    });
     let reads = (
         "#",
         "commands for the Betaflight command line, computed from rad/s and m/s^2",
     );
     Remarks::of_program(values, reads, &program, &[UNCORRECTED])
+        .omitting(of_compass.or(compass))
         .defines([
             of_counts("an accelerometer", COUNTS_PER_G, "g"),
             of_counts("gyros", COUNTS_PER_RAD_S, "rad/s"),

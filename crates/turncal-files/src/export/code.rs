@@ -1,26 +1,35 @@
 //! A C99 header, without dependencies: constants and functions.
 
+use nalgebra::{Matrix3, Vector3};
+
 use super::notation::numbers;
-use super::remarks::{Exported, Remarks, SIGMA, equation};
+use super::remarks::{Exported, Remarks, SIGMA, equation, magnetic_words};
 use super::values::Values;
 use turncal::calibration::ThermalRecord;
 use turncal::imu::{AXES, InstallationForm, Sensor};
 
 /// `turncal_calibrate`.
 const FUNCTION: &str = include_str!("code/calibrate.h");
+/// `turncal_calibrate_mag`.
+const OF_MAGNETOMETER: &str = include_str!("code/calibrate_mag.h");
 /// `turncal_calibrate_at`, at a temperature.
 const AT_TEMPERATURE: &str = include_str!("code/calibrate_at.h");
 
 pub fn write(values: &Values) -> Exported {
+    let constants_of = |sensor: Sensor| {
+        let matrix = values.correction.matrix.get(sensor);
+        constants(sensor.name(), matrix, values.correction.bias.get(sensor))
+    };
     let text = format!(
         "
 #ifndef TURNCAL_CALIBRATION_H
 #define TURNCAL_CALIBRATION_H
 
 {}{FUNCTION}
-{}{}#endif
+{}{}{}#endif
 ",
-        Sensor::ALL.map(|sensor| constants(values, sensor)).concat(),
+        Sensor::ALL.map(constants_of).concat(),
+        magnetometer(values),
         at_temperature(values),
         test_vectors(values)
     );
@@ -30,6 +39,7 @@ pub fn write(values: &Values) -> Exported {
         .defines(equation(values))
         .defines([functions.to_owned()])
         .defines(polynomial_words(values))
+        .defines(magnetic_words(values))
         .above(&text)
 }
 
@@ -48,9 +58,16 @@ fn test_vectors(values: &Values) -> String {
     }
 }
 
-fn constants(values: &Values, sensor: Sensor) -> String {
-    let name = sensor.name();
-    let matrix = values.correction.matrix.get(sensor);
+/// Constants and function of the magnetometer, if there is one.
+fn magnetometer(values: &Values) -> String {
+    let Some(mag) = &values.record.mag else {
+        return String::new();
+    };
+    let matrix = Matrix3::from_fn(|i, j| mag.correction[i][j]);
+    constants("mag", &matrix, &mag.bias.into()) + OF_MAGNETOMETER + "\n"
+}
+
+fn constants(name: &str, matrix: &Matrix3<f64>, bias: &Vector3<f64>) -> String {
     format!(
         "\
 static const double turncal_{name}_correction[3][3] = {{
@@ -62,7 +79,7 @@ static const double turncal_{name}_bias[3] = {{{}}};
         [0, 1, 2]
             .map(|i| format!("    {{{}}}", numbers(matrix.row(i).iter())))
             .join(",\n"),
-        numbers(values.correction.bias.get(sensor))
+        numbers(bias)
     )
 }
 

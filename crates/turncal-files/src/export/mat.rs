@@ -43,6 +43,19 @@ pub fn write(values: &Values) -> Exported {
         }
         fields.push((sensor.name(), structure("", &of_triad)));
     }
+    if let Some(mag) = &values.record.mag {
+        let mut of_mag = magnetometer(&mag.matrix, &mag.bias);
+        of_mag.push(("correction", by_columns(&mag.correction)));
+        of_mag.push(("unit", text(&mag.unit)));
+        of_mag.push(("field_unit", text(&mag.field.unit)));
+        if let Some(sigma) = &mag.sigma {
+            of_mag.push((
+                "sigma",
+                structure("", &magnetometer(&sigma.matrix, &sigma.bias)),
+            ));
+        }
+        fields.push(("mag", structure("", &of_mag)));
+    }
     // The matrix is symmetric, so rows equal columns.
     let covariance = values.record.covariance.concat();
     let size = values.record.covariance.len();
@@ -58,11 +71,19 @@ pub fn write(values: &Values) -> Exported {
     Remarks::new(values, "", &[]).of_file(file)
 }
 
+fn magnetometer(matrix: &[[f64; 3]; 3], bias: &[f64; 3]) -> Vec<(&'static str, Vec<u8>)> {
+    vec![("matrix", by_columns(matrix)), ("bias", numbers(3, bias))]
+}
+
+/// A matrix that is stored row by row.
+fn by_columns(rows: &[[f64; 3]; 3]) -> Vec<u8> {
+    numbers(3, Matrix3::from_fn(|i, j| rows[i][j]).as_slice())
+}
+
 fn triad(record: &TriadRecord) -> Vec<(&'static str, Vec<u8>)> {
-    let installation = Matrix3::from_fn(|i, j| record.installation[i][j]);
     vec![
         ("scale", numbers(3, &record.scale)),
-        ("installation", numbers(3, installation.as_slice())),
+        ("installation", by_columns(&record.installation)),
         ("bias", numbers(3, &record.bias)),
     ]
 }

@@ -5,6 +5,7 @@
 mod affine;
 mod autopilot;
 mod code;
+mod compass;
 mod kalibr;
 mod kf_gins;
 mod mat;
@@ -63,22 +64,23 @@ temperature rate, and polynomial orders above three; the biases are functions of
 
 /// Every format.
 #[rustfmt::skip]
-pub static FORMATS: [Format; 14] = [
+pub static FORMATS: [Format; 15] = [
     row("kalibr", "yaml", "IMU configuration for Kalibr, with the intrinsics of its model \
     scale-misalignment", Log, kalibr::kalibr),
     row("kf-gins", "yaml", "IMU section of a KF-GINS configuration", FrontRightDown, kf_gins::write),
     row("c", "h", "A C99 header with constants and a function", RightFrontUp, code::write).with_temperature(""),
     row("text", "txt", "All values with name, σ and unit", RightFrontUp, text::write),
-    row("px4", "params", "PX4 parameters: CAL_GYRO0, CAL_ACC0", FrontRightDown, autopilot::px4)
+    row("px4", "params", "PX4 parameters: CAL_GYRO0, CAL_ACC0, CAL_MAG0", FrontRightDown, autopilot::px4)
         .with_temperature(IN_AUTOPILOTS),
-    row("ardupilot", "param", "ArduPilot parameters: INS_GYROFFS, INS_ACCOFFS, INS_ACCSCAL", FrontRightDown,
+    row("ardupilot", "param", "ArduPilot parameters: INS_GYROFFS, INS_ACCOFFS, INS_ACCSCAL, COMPASS_", FrontRightDown,
         autopilot::ardupilot).with_temperature(IN_AUTOPILOTS),
     row("open-vins-kalibr", "yaml", "IMU intrinsics for OpenVINS, with its model kalibr", Log, kalibr::open_vins_kalibr),
     row("open-vins-rpng", "yaml", "IMU intrinsics for OpenVINS, with its model rpng", Log, kalibr::open_vins_rpng),
     row("imu-calib", "yaml", "Accelerometer calibration for the ROS package imu_calib", Log, ros::imu_calib),
     row("ros-covariance", "yaml", "Covariances for ROS sensor_msgs/Imu, from the noise of a run", Log, ros::covariance),
+    row("imu-filter-madgwick", "yaml", "Magnetometer bias for the ROS package imu_filter_madgwick", Log, ros::madgwick),
     row("mat", "mat", "A MATLAB structure (MAT file)", RightFrontUp, mat::write),
-    row("betaflight", "txt", "Accelerometer zeros for Betaflight", Log, autopilot::betaflight),
+    row("betaflight", "txt", "Accelerometer and magnetometer zeros for Betaflight", Log, autopilot::betaflight),
     row("inav", "txt", "Zeros and gains for INAV", Log, autopilot::inav),
     row("realsense", "bin", "IMU calibration table of a RealSense D400 camera, as written by rs-imu-calibration", Log,
         realsense::write),

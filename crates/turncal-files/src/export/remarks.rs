@@ -152,6 +152,15 @@ pub fn title(record: &Calibration) -> String {
     parts.join("; ")
 }
 
+/// Definition of the values of the magnetometer, for formats that contain them unchanged.
+pub fn magnetic_words(values: &Values) -> Option<String> {
+    let mag = values.record.mag.as_ref()?;
+    Some(format!(
+        "magnetometer: {}; N in {}, field in {}, along the axes of u",
+        mag.equation, mag.unit, mag.field.unit
+    ))
+}
+
 /// Definitions of `N` and `u`, for formats that contain the values of the calibration file unchanged.
 pub fn equation(values: &Values) -> [String; 2] {
     let record = values.record;

@@ -1,13 +1,15 @@
-//! ROS: covariances of `sensor_msgs/Imu`, and the accelerometer calibration file that `imu_calib` reads.
+//! ROS: covariances of `sensor_msgs/Imu`, the accelerometer calibration file that `imu_calib` reads, and the hard iron that
+//! `imu_filter_madgwick` subtracts.
 //!
 //! Source: ROS common_interfaces, `sensor_msgs/Imu`; imu_calib, `AccelCalib::applyCalib` and
-//! `ApplyCalib::rawImuCallback`.
+//! `ApplyCalib::rawImuCallback`; imu_tools, `ImuFilterRos::imuMagCallback`.
 
 use super::affine::Affine;
-use super::notation::list;
+use super::notation::{list, number};
 use super::remarks::{Exported, Remarks};
 use super::values::Values;
-use turncal::imu::{PerSensor, Sensor};
+use crate::quantity::units_of_field;
+use turncal::imu::{AXES, PerSensor, Sensor};
 
 /// Covariance matrices about x, y, z in row-major order, with the variance per sample, density² × rate.
 pub fn covariance(values: &Values) -> Exported {
@@ -49,4 +51,25 @@ pub fn imu_calib(values: &Values) -> Exported {
     let bias = list(&program.accel.corrected_bias());
     Remarks::of_program(values, reads, &program, &notes)
         .above(&format!("SM: {matrix}\nbias: {bias}\n"))
+}
+
+/// Hard iron, which `imu_filter_madgwick` subtracts from `sensor_msgs/MagneticField`.
+pub fn madgwick(values: &Values) -> Exported {
+    let notes = [
+        "scale, misalignment and bias of gyros and accelerometers, and soft iron; publish the output of `turncal \
+                  apply`, from which these errors are removed",
+    ];
+    let remarks = Remarks::new(values, "#", &notes).including(|_| true);
+    let Some(mag) = &values.record.mag else {
+        return remarks
+            .omitting(["the calibration has no magnetometer".to_owned()])
+            .above("");
+    };
+    let unit = units_of_field().find(|(name, _)| *name == mag.unit);
+    let per_tesla = unit.map_or(1.0, |(_, per_tesla)| per_tesla);
+    let line = |k: usize| {
+        let bias = number(mag.bias[k] / per_tesla);
+        format!("mag_bias_{}: {bias}\n", AXES[k])
+    };
+    remarks.above(&[0, 1, 2].map(line).concat())
 }

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::notation::numbers;
-use super::remarks::{Exported, Remarks, equation};
+use super::remarks::{Exported, Remarks, equation, magnetic_words};
 use super::values::Values;
 use turncal::imu::{AXES, Sensor, Term};
 use turncal::units::{DEG_PER_H, MICRO_G};
@@ -31,6 +31,7 @@ pub fn write(values: &Values) -> Exported {
             row(&name, matrix[(i, j)], None, &unit)
         }));
     }
+    lines.extend(magnetometer(values).into_iter().flatten());
     let vectors = &values.record.test_vectors;
     let title = "\ntest vectors, raw -> calibrated, gyros x y z, accelerometers x y z:";
     lines.extend((!vectors.is_empty()).then(|| title.to_owned()));
@@ -39,7 +40,44 @@ pub fn write(values: &Values) -> Exported {
     Remarks::new(values, "#", &[covariance])
         .including(|_| true)
         .defines(equation(values))
+        .defines(magnetic_words(values))
         .above(&(lines.join("\n") + "\n"))
+}
+
+/// The magnetometer, if there is one.
+fn magnetometer(values: &Values) -> Option<Vec<String>> {
+    let mag = values.record.mag.as_ref()?;
+    let (unit, field) = (&mag.unit, &mag.field.unit);
+    let value = |name: &String| {
+        let per_field = format!("{unit} per {field}");
+        let unit = if name.starts_with("mag.bias") {
+            unit
+        } else {
+            &per_field
+        };
+        Some(row(
+            name,
+            *mag.get(name)?,
+            mag.sigma_of(name).copied(),
+            unit,
+        ))
+    };
+    let correction = places().map(|(i, j, place)| {
+        let unit = format!("{field} per {unit}");
+        row(
+            &format!("mag.correction.{place}"),
+            mag.correction[i][j],
+            None,
+            &unit,
+        )
+    });
+    Some(
+        mag.parameters
+            .iter()
+            .filter_map(value)
+            .chain(correction)
+            .collect(),
+    )
 }
 
 /// Entries of a matrix, with their names.

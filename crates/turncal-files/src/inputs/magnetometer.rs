@@ -4,26 +4,17 @@ use std::path::PathBuf;
 
 use nalgebra::Vector3;
 
+use crate::quantity::units_of_field;
 use crate::schema::Names;
 use crate::schema::instrument::Fields;
 use turncal::calibration::Source as NoiseSource;
 use turncal::earth::Site;
 use turncal::magnetic::LocalField;
-use turncal::recording::{ColumnFacts, ImuSamples, MAGNETIC_COUNT, Magnetometer};
+use turncal::recording::{ColumnFacts, ImuSamples, Magnetometer};
 use turncal_input::{FileError, list, suggestion};
 use turncal_logs::clock::{Clock, Stamp};
 use turncal_logs::{DataFile, Source};
 
-/// Units with their number per tesla.
-const UNITS: [(&str, f64); 7] = [
-    ("uT", 1e6),
-    ("nT", 1e9),
-    ("mT", 1e3),
-    ("T", 1.0),
-    ("G", 1e4),
-    ("mG", 1e7),
-    ("count", MAGNETIC_COUNT),
-];
 /// Rows after which times are released, and number of values whose step is determined.
 const ROWS: usize = 1 << 16;
 
@@ -53,8 +44,8 @@ impl<'a> Fields<'a> {
             let meaning = "the unit of the values in the file";
             return Err(self.document.missing("imu.mag_unit", meaning));
         };
-        let names = || UNITS.iter().map(|(name, _)| *name);
-        let Some((_, nominal)) = UNITS.iter().find(|(name, _)| *name == unit) else {
+        let names = || units_of_field().map(|(name, _)| name);
+        let Some((_, nominal)) = units_of_field().find(|(name, _)| *name == unit) else {
             let expected = format!("one of {}", list(names()));
             let advice = suggestion(unit, names(), "Choose one of them.");
             return Err(self.document.wrong("imu.mag_unit", expected, advice));
@@ -64,7 +55,7 @@ impl<'a> Fields<'a> {
         let (source, clock) = from.unwrap_or_else(|| (gyro.clone(), clock));
         let (_, (key, of_key)) = NoiseSource::MagneticDisturbance.stated_in();
         let stated = imu.noise.get(key).copied().flatten();
-        let mut empty = Magnetometer::new(unit, *nominal);
+        let mut empty = Magnetometer::new(unit, nominal);
         empty.disturbance = stated.map_or(0.0, |stated| stated.0 * of_key);
         empty.field = self.field(site);
         let instance = imu.instance.as_ref().filter(|_| !is_separate);

@@ -13,6 +13,8 @@ pub fn add(document: &mut Document, report: &Report) {
     };
     let values = values::table(report.calibration);
     document.brief.push(values.into());
+    let magnetometer = values::magnetometer(report.calibration);
+    document.brief.extend(magnetometer.map(Into::into));
     document.brief.push(accuracy(report, estimate).into());
     let navigated = report.navigation.ok().filter(|of| !of.is_empty());
     let mut facts = Facts::default();

@@ -135,7 +135,7 @@ impl StatedUnit {
         let is_of_it = |unit: &Unit| match unit.of {
             Of::Rows(of, _) => of == sensor,
             Of::Count => unit.times == 1.0,
-            Of::Time | Of::Other => false,
+            Of::Time | Of::Field | Of::Other => false,
         };
         let unit = name::unit(text).filter(is_of_it);
         unit.map(Self).ok_or_else(|| {

@@ -1,0 +1,61 @@
+//! The magnetometer of a log, found by the names of its columns.
+
+use nalgebra::Vector3;
+
+use super::columns::{by_stem, varies};
+use super::name::Name;
+use crate::Sheet;
+use crate::quantity::units_of_field;
+use turncal::statistics::median;
+
+/// Magnitude of the field of the Earth, T, within a factor of two in any place.
+const FIELD: f64 = 45e-6;
+
+/// The columns of a magnetometer, and the unit of its values.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MagnetometerColumns {
+    pub columns: [usize; 3],
+    pub unit: &'static str,
+    pub why: &'static str,
+}
+
+impl MagnetometerColumns {
+    /// The first complete triad, preferably one with a unit; its values may be in few of the rows.
+    pub fn find(sheet: &Sheet, names: &[Name]) -> Option<Self> {
+        let is = |k: &usize| names[*k].is_magnetic() && varies(&sheet.columns[*k]);
+        let candidates: Vec<usize> = (0..names.len()).filter(is).collect();
+        let all = by_stem(names, &candidates);
+        let unit = |triad: &[usize; 3]| names[triad[0]].unit.and_then(|unit| word(unit.word));
+        let columns = all.into_iter().min_by_key(|triad| unit(triad).is_none())?;
+        let (unit, why) = match unit(&columns) {
+            Some(unit) => (unit, "stated in the file"),
+            None => (
+                by_size(sheet, columns)?,
+                "guess: with this unit, the values are most like the field of the Earth",
+            ),
+        };
+        Some(Self { columns, unit, why })
+    }
+}
+
+/// The unit of a column with this unit; gauss may be spelled like the unit of accelerometers.
+fn word(of_column: &'static str) -> Option<&'static str> {
+    let word = match of_column {
+        "g" => "G",
+        "mg" => "mG",
+        other => other,
+    };
+    units_of_field()
+        .map(|(name, _)| name)
+        .find(|name| *name == word)
+}
+
+/// The unit in which the values are most like the field of the Earth.
+fn by_size(sheet: &Sheet, columns: [usize; 3]) -> Option<&'static str> {
+    let value = |row| Vector3::from(columns.map(|k| sheet.columns[k][row])).norm();
+    let sizes = (0..sheet.rows()).map(value).filter(|size| *size > 0.0);
+    let size = median(&mut sizes.collect::<Vec<_>>())?;
+    let off = |(_, per_tesla): &(&str, f64)| (size / per_tesla / FIELD).ln().abs();
+    let nearest = units_of_field().min_by(|one, other| off(one).total_cmp(&off(other)));
+    nearest.map(|(word, _)| if word == "mG" { "count" } else { word })
+}
