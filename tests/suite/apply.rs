@@ -395,6 +395,7 @@ fn rows_written_in_parts_are_the_samples_to_the_last_bit_even_as_the_temperature
     let all = Samples {
         run,
         correction: &correction,
+        magnetometer: None,
         fill: false,
         verdict: None,
     };

@@ -69,6 +69,15 @@ impl Sheet {
         columns.iter().any(|&k| self.columns[k][row].is_finite())
     }
 
+    /// Whether a column has two different numbers.
+    pub fn varies(&self, column: usize) -> bool {
+        let mut values = self.columns[column]
+            .iter()
+            .filter(|value| value.is_finite());
+        let first = values.next();
+        first.is_some_and(|first| values.any(|value| value != first))
+    }
+
     /// Keeps the rows that satisfy a condition.
     pub fn retain(&mut self, keep: impl Fn(&Self, usize) -> bool) {
         let kept: Vec<bool> = (0..self.rows()).map(|row| keep(self, row)).collect();

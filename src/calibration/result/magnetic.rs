@@ -1,6 +1,6 @@
 //! The magnetometer in a calibration file.
 
-use nalgebra::{DMatrix, Matrix3, SVector};
+use nalgebra::{DMatrix, Matrix3, SVector, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::calibration::MagneticEstimate;
@@ -117,6 +117,14 @@ impl MagRecord {
         let row = |i: usize| (0..OF_TRIAD).map(|j| covariance[(i, j)]).collect();
         record.covariance = (0..OF_TRIAD).map(row).collect();
         Some(record)
+    }
+
+    /// Times, s, and fields along the body axes in `field.unit` of a magnetometer in the same unit.
+    pub fn corrected(&self, log: &Magnetometer) -> impl Iterator<Item = (f64, Vector3<f64>)> {
+        let correction = Matrix3::from_fn(|i, j| self.correction[i][j]);
+        let bias = Vector3::from(self.bias);
+        log.values()
+            .map(move |(time, value)| (time, correction * (value - bias)))
     }
 
     /// A value by name, such as `mag.matrix.xy`.

@@ -25,7 +25,8 @@ const SUSPECT_SIGMAS: f64 = 10.0;
 /// Writes one row per sample: start and end in s, angular rate in rad/s and specific force in m/s², both averaged over
 /// the sample, along the right, forward and up axes of the body frame of the calibration. Also corrects the data for
 /// the error terms of the calibration and, if the run contains temperatures, for the temperature dependence. The
-/// correction for the time offset neglects Earth rate. The name of the last column states the verdict of the
+/// correction for the time offset neglects Earth rate. If calibration and run have a magnetometer, its columns contain
+/// the field as means over 0.1 s, each in the row that contains the middle of the 0.1 s; the other rows are empty. The name of the last column states the verdict of the
 /// calibration, for example verdict_good; the column contains 1 in every row. You can use the output as the log of
 /// another run.toml with output = "rate" and time_stamp = "end".
 #[derive(Debug, clap::Args)]
@@ -75,6 +76,10 @@ impl Apply {
             run: &run,
             correction: &correction,
             fill: self.fill,
+            magnetometer: record.mag.as_ref().filter(|of| {
+                let log = run.recording.magnetometer.as_ref();
+                log.is_some_and(|log| log.unit == of.unit)
+            }),
             verdict: record.word(),
         };
         match &self.output {
@@ -136,6 +141,18 @@ fn notes(record: &Calibration, correction: &Correction, run: &Run) -> Vec<String
             "the calibration does not state units, so turncal assumed the units of the run"
                 .to_owned(),
         );
+    }
+    let in_run = run.recording.magnetometer.as_ref();
+    let units = record
+        .mag
+        .as_ref()
+        .zip(in_run)
+        .map(|(of, log)| (&of.unit, &log.unit));
+    if let Some((own, other)) = units.filter(|(own, other)| own != other) {
+        notes.push(format!(
+            "the magnetometer was calibrated in {own}, but the run has {other}: turncal left it out; set mag_unit in \
+             run.toml to {own}"
+        ));
     }
     for sensor in Sensor::ALL {
         let scale = correction.sensitivity.get(sensor).diagonal();

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::magnetometer::MagnetometerColumns;
-use super::name::Name;
+use super::name::{Name, by_stem};
 use super::stated::StatedColumns;
 use super::triads::{Doubt, Identified, Triad, consecutive, is_uneven, overlap};
 use crate::Sheet;
@@ -188,22 +188,15 @@ pub fn have_rows_of_their_own(sheet: &Sheet) -> bool {
     Sensor::ALL.into_iter().all(has) && f64::from(one) > LACKING * f64::from(both + one)
 }
 
-/// Whether a column has two different numbers.
-pub fn varies(values: &[f64]) -> bool {
-    let mut values = values.iter().filter(|value| value.is_finite());
-    let first = values.next();
-    first.is_some_and(|first| values.any(|value| value != first))
-}
-
 /// Name and value of the first column whose name is that of a time, but whose value never changes.
 pub fn standing_time(sheet: &Sheet) -> Option<(&str, f64)> {
-    let mut columns = sheet.names.iter().zip(&sheet.columns);
-    let stands = |(name, values): &(&String, &Vec<f64>)| {
-        let is_time = Name::of(name).is_time() > 1;
-        is_time && values.iter().all(|value| value.is_finite()) && !varies(values)
+    let stands = |k: &usize| {
+        let is_time = Name::of(&sheet.names[*k]).is_time() > 1;
+        let mut values = sheet.columns[*k].iter();
+        is_time && values.all(|value| value.is_finite()) && !sheet.varies(*k)
     };
-    let (name, values) = columns.find(stands)?;
-    Some((name.as_str(), *values.first()?))
+    let column = (0..sheet.names.len()).find(stands)?;
+    Some((&sheet.names[column], *sheet.columns[column].first()?))
 }
 
 /// The first column with the name of a time whose values decrease from row to row.
@@ -320,28 +313,6 @@ fn by_name(names: &[Name], sheet: &Sheet, sensor: Sensor) -> Vec<[usize; 3]> {
     by_stem(names, &candidates)
 }
 
-/// Groups of three columns whose names differ only in the axis.
-pub fn by_stem(names: &[Name], candidates: &[usize]) -> Vec<[usize; 3]> {
-    let mut triads = Vec::new();
-    for &first in candidates {
-        let axes = match names[first].axis {
-            Some('x') => ['x', 'y', 'z'],
-            Some('0') => ['0', '1', '2'],
-            Some('1') if !candidates.iter().any(|&k| names[k].axis == Some('0')) => ['1', '2', '3'],
-            _ => continue,
-        };
-        let of = |axis| {
-            let same =
-                |k: &&usize| names[**k].stem == names[first].stem && names[**k].axis == Some(axis);
-            candidates.iter().find(same).copied()
-        };
-        if let [Some(x), Some(y), Some(z)] = axes.map(of) {
-            triads.push([x, y, z]);
-        }
-    }
-    triads
-}
-
 /// The triads by name; of a sensor without names, all that the names and units of other columns allow.
 fn candidates(
     sheet: &Sheet,
@@ -352,7 +323,7 @@ fn candidates(
     let is_free = |k: &usize| {
         !taken.contains(k) && !names[*k].is_of_another_sensor() && is_numeric(sheet, *k)
     };
-    let varies = |k: &usize| varies(&sheet.columns[*k]);
+    let varies = |k: &usize| sheet.varies(*k);
     let free: Vec<usize> = (0..names.len()).filter(is_free).collect();
     let has_stem = |k: &usize| names[*k].stem.contains(char::is_alphabetic);
     let with_stem: Vec<usize> = free.iter().copied().filter(has_stem).collect();

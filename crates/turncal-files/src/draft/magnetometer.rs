@@ -2,8 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::columns::{by_stem, varies};
-use super::name::Name;
+use super::name::{Name, by_stem};
 use crate::Sheet;
 use crate::quantity::units_of_field;
 use turncal::statistics::median;
@@ -22,7 +21,7 @@ pub struct MagnetometerColumns {
 impl MagnetometerColumns {
     /// The first complete triad, preferably one with a unit; its values may be in few of the rows.
     pub fn find(sheet: &Sheet, names: &[Name]) -> Option<Self> {
-        let is = |k: &usize| names[*k].is_magnetic() && varies(&sheet.columns[*k]);
+        let is = |k: &usize| names[*k].is_magnetic() && sheet.varies(*k);
         let candidates: Vec<usize> = (0..names.len()).filter(is).collect();
         let all = by_stem(names, &candidates);
         let unit = |triad: &[usize; 3]| names[triad[0]].unit.and_then(|unit| word(unit.word));

@@ -237,6 +237,28 @@ impl Name {
     }
 }
 
+/// Groups of three columns whose names differ only in the axis.
+pub fn by_stem(names: &[Name], candidates: &[usize]) -> Vec<[usize; 3]> {
+    let mut triads = Vec::new();
+    for &first in candidates {
+        let axes = match names[first].axis {
+            Some('x') => ['x', 'y', 'z'],
+            Some('0') => ['0', '1', '2'],
+            Some('1') if !candidates.iter().any(|&k| names[k].axis == Some('0')) => ['1', '2', '3'],
+            _ => continue,
+        };
+        let of = |axis| {
+            let same =
+                |k: &&usize| names[**k].stem == names[first].stem && names[**k].axis == Some(axis);
+            candidates.iter().find(same).copied()
+        };
+        if let [Some(x), Some(y), Some(z)] = axes.map(of) {
+            triads.push([x, y, z]);
+        }
+    }
+    triads
+}
+
 fn axis_at_end(word: &str) -> Option<(&str, char)> {
     let axis = word.chars().next_back()?;
     let stem = word.strip_suffix(['x', 'y', 'z', '0', '1', '2', '3'])?;

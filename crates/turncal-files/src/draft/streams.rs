@@ -1,8 +1,8 @@
 //! Selects the streams or files that contain the data of the instrument.
 
-use super::columns::{self, Columns, by_stem};
+use super::columns::{self, Columns};
 use super::magnetometer::MagnetometerColumns;
-use super::name::Name;
+use super::name::{Name, by_stem};
 use super::time;
 use super::triads::{Triad, uneven};
 use crate::Sheet;

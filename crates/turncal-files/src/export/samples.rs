@@ -4,9 +4,11 @@ use std::io::{self, Write};
 use std::ops::Range;
 use std::path::Path;
 
+use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use crate::{write_rows, write_whole_with};
+use turncal::calibration::result::MagRecord;
 use turncal::calibration::{Correction, Word};
 use turncal::recording::nanoseconds;
 use turncal::run::Run;
@@ -15,6 +17,10 @@ use turncal_input::FileError;
 /// Start and end of a sample, and angular rate and specific force along the right, front and up axes.
 pub const HEADER: &str = "start_s,end_s,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s,accel_x_m_s2,\
                           accel_y_m_s2,accel_z_m_s2";
+
+/// Columns of the magnetic field; they are empty in rows without a value.
+const IN_TESLA: &str = ",mag_x_t,mag_y_t,mag_z_t";
+const RELATIVE: &str = ",mag_x,mag_y,mag_z";
 
 /// Usual length of a row, bytes.
 const ROW_LENGTH: usize = 176;
@@ -32,6 +38,8 @@ pub struct Samples<'a> {
     pub correction: &'a Correction,
     /// Whether missing samples are interpolated and also written, with 1 in a column `filled`.
     pub fill: bool,
+    /// The calibration of the magnetometer, if the run has one in the same unit.
+    pub magnetometer: Option<&'a MagRecord>,
     /// Verdict of the calibration, used as the name of the last column.
     pub verdict: Option<Word>,
 }
@@ -47,15 +55,18 @@ impl Samples<'_> {
         let filled = optional(self.fill, ",filled");
         let verdict = self.verdict.map(|word| format!(",{}", word.column()));
         let verdict = verdict.unwrap_or_default();
-        writeln!(file, "{HEADER}{in_range}{filled}{verdict}")?;
+        let field = self.magnetometer.map(|of| &*of.field.unit);
+        let field = field.map_or("", |unit| if unit == "T" { IN_TESLA } else { RELATIVE });
+        writeln!(file, "{HEADER}{field}{in_range}{filled}{verdict}")?;
         let imu = &self.run.recording.imu;
+        let field = self.field();
         let (samples, lost) = (imu.len(), imu.lost());
         let parts = (0..samples).step_by(ROWS);
         let parts: Vec<_> = parts
             .map(|first| first..samples.min(first + ROWS))
             .collect();
         for parts in parts.chunks(TASKS) {
-            let text = |part: &Range<usize>| self.part(part.clone(), &lost);
+            let text = |part: &Range<usize>| self.part(part.clone(), &lost, &field);
             for text in parts.par_iter().map(text).collect::<Vec<_>>() {
                 file.write_all(&text)?;
             }
@@ -71,13 +82,30 @@ impl Samples<'_> {
         })
     }
 
+    /// Corrected means of the magnetometer, each with the sample that contains the middle of its span.
+    fn field(&self) -> Vec<(usize, Vector3<f64>)> {
+        let recording = &self.run.recording;
+        let both = self.magnetometer.zip(recording.magnetometer.as_ref());
+        let values = both.into_iter().flat_map(|(of, log)| of.corrected(log));
+        let place = |time| recording.imu.edge(time).max(0.0) as usize;
+        values.map(|(time, value)| (place(time), value)).collect()
+    }
+
     /// The rows of some samples.
-    fn part(&self, samples: Range<usize>, lost: &[Range<usize>]) -> Vec<u8> {
+    fn part(
+        &self,
+        samples: Range<usize>,
+        lost: &[Range<usize>],
+        field: &[(usize, Vector3<f64>)],
+    ) -> Vec<u8> {
         let (correction, fill) = (self.correction, self.fill);
         let mut text = Vec::with_capacity(samples.len() * ROW_LENGTH);
         let mut number = zmij::Buffer::new();
         let lost = &lost[lost.partition_point(|lost| lost.end <= samples.start)..];
         let mut lost = lost.iter().peekable();
+        let mut field = field[field.partition_point(|of| of.0 < samples.start)..]
+            .iter()
+            .peekable();
         for (k, sample) in samples.clone().zip(correction.samples(self.run, samples)) {
             while lost.next_if(|lost| lost.end <= k).is_some() {}
             let is_lost = lost.peek().is_some_and(|lost| lost.contains(&k));
@@ -90,6 +118,16 @@ impl Samples<'_> {
                 text.push(b',');
             }
             text.pop();
+            let mut here = None;
+            while let Some((_, value)) = field.next_if(|of| of.0 <= k) {
+                here = Some(value);
+            }
+            for axis in (0..3).filter(|_| self.magnetometer.is_some()) {
+                text.push(b',');
+                if let Some(value) = here {
+                    text.extend_from_slice(number.format(value[axis]).as_bytes());
+                }
+            }
             if correction.changes() {
                 text.extend([b',', b'0' + u8::from(sample.in_range)]);
             }
