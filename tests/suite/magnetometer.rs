@@ -6,7 +6,7 @@ use std::fs;
 use std::path::Path;
 
 use crate::export::{numbers, record, text_of};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Rotation3, Vector3};
 use turncal::calibration::result::{Calibration, FieldRecord, MagRecord};
 use turncal::calibration::{Method, Options, Problem, UNWATCHED};
 use turncal::magnetic::LocalField;
@@ -307,13 +307,23 @@ fn counts_and_whole_matrices_go_where_a_program_takes_them() {
     for (axis, value) in ["x", "y", "z"].into_iter().zip(bias) {
         assert!((madgwick[&format!("mag_bias_{axis}")] - value * 1e-6).abs() < 1e-12);
     }
-    // An axis order that the parameters cannot hold is told.
-    let turned = full * matrix([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]);
-    let (text, notes) = text_of(&with_magnetometer(turned, bias, "uT"), "px4", None);
-    assert!(!text.contains("CAL_MAG0_XOFF"));
+    // The driver turns the axes of the chip by right angles; the parameters are the same.
+    let turn = matrix([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]);
+    let px4 =
+        |sensitivity, bias| text_of(&with_magnetometer(sensitivity, bias, "uT"), "px4", None).0;
+    let [x, y, z] = bias;
+    let [straight, turned] =
+        [px4(full, bias), px4(turn * full, [y, -x, z])].map(|of| parameters(&of));
+    for (name, value) in straight
+        .iter()
+        .filter(|(name, _)| name.starts_with("CAL_MAG0"))
+    {
+        assert!((turned[name] - value).abs() < 1e-6, "{name}");
+    }
+    let between = Rotation3::from_axis_angle(&Vector3::z_axis(), 0.7).into_inner();
+    let notes = text_of(&with_magnetometer(between * full, bias, "uT"), "px4", None).1;
     assert!(
-        notes
-            .iter()
-            .any(|note| note.contains("in the order of the gyro columns"))
+        notes.iter().any(|note| note.contains("no rotation")),
+        "{notes:?}"
     );
 }

@@ -1,6 +1,5 @@
-//! A magnetometer as autopilots apply it: `matrix (n − offset)` along the axes of the vehicle, with a symmetric matrix.
-//!
-//! The parameters have no rotation: the axes of the magnetometer must already be those of the vehicle.
+//! A magnetometer as autopilots apply it: `matrix (n − offset)` with a symmetric matrix, along the axes of the vehicle to
+//! which the driver turns the output.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -8,7 +7,7 @@ use super::values::Values;
 use crate::quantity::units_of_field;
 use turncal::units::DEGREE;
 
-/// Cosine between an axis of the magnetometer and that of the vehicle, below which another axis may be nearer.
+/// Smallest cosine between an axis of the magnetometer and the nearest axis of the vehicle.
 const ALONG: f64 = 0.8;
 
 /// Offset and matrix in the quantity that a program reads.
@@ -51,18 +50,32 @@ pub fn compass(values: &Values, reads: Reads) -> Option<Result<Compass, String>>
         sensitivity /= sensitivity.determinant().abs().cbrt();
     }
     let svd = sensitivity.svd(true, true);
-    let axes = svd.u? * svd.v_t?;
-    if axes.diagonal().min() < ALONG {
-        let why = "its axes are not those of the vehicle; list the columns in `mag` of run.toml in the order of the \
-                   gyro columns, with a minus sign where an axis is opposite";
+    let Some(axes) = nearest(&(svd.u? * svd.v_t?)) else {
+        let why = "no axis of the magnetometer is along an axis of the gyros, and the parameters contain no rotation";
         return Some(Err(why.to_owned()));
-    }
+    };
+    let to_vehicle = axes.transpose();
+    let (sensitivity, offset) = match reads {
+        Reads::Field(_) => (
+            to_vehicle * sensitivity,
+            to_vehicle * Vector3::from(mag.bias) * ratio,
+        ),
+        // These programs correct the axes of the chip, and then turn them.
+        Reads::Counts => (sensitivity * to_vehicle, mag.bias.into()),
+    };
     let inverse = sensitivity.try_inverse()?;
     Some(Ok(Compass {
         matrix: (inverse + inverse.transpose()) / 2.0,
-        offset: Vector3::from(mag.bias) * ratio,
+        offset,
         sensitivity,
     }))
+}
+
+/// The order and signs of the axes that are nearest to a rotation or reflection.
+fn nearest(axes: &Matrix3<f64>) -> Option<Matrix3<f64>> {
+    let rounded = axes.map(f64::round);
+    let is_order = axes.component_mul(&rounded).column_sum().min() > ALONG;
+    (is_order && (rounded.transpose() * rounded).is_identity(0.1)).then_some(rounded)
 }
 
 impl Compass {
