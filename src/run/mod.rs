@@ -97,7 +97,7 @@ pub struct Standstill {
     /// White 1σ of the integral of each triad's output at standstill: attitude in rad, velocity in m/s;
     /// estimated from the dwells if not given.
     pub sigma: PerSensor<Option<f64>>,
-    /// Unwanted rotation of the body at rest, if no table is observed: 1σ density of a random walk, rad/√s.
+    /// Unwanted rotation of the body at rest, used without a table: 1σ density of a random walk, rad/√s.
     pub turning: f64,
     /// 1σ of the position of the IMU while the table is at rest, m. This σ must be at least the distance of the IMU
     /// from the table centre, because the IMU moves that far between positions.

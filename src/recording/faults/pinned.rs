@@ -1,8 +1,8 @@
 //! Detection of axes that stay at one value while the instrument is working: stuck within their range, or clipped at
 //! its end.
 //!
-//! A working axis repeats a value only as long as its noise and motion remain within one step of its grid. A run of
-//! equal values is a fault if it is improbable. The test compares the run with the noise of the axis at rest, the level
+//! A working axis repeats a value only while its noise and motion stay within one step of its output. A run of equal
+//! values is a fault if it is improbable. The test compares the run with the noise of the axis at rest, the level
 //! on either side, the motion that crosses the run and, at an end of the range, the motion on either side.
 
 mod ends;

@@ -1,4 +1,4 @@
-//! The methods, and their calibrations of an instrument.
+//! The methods, and the calibration of an instrument by each.
 
 use serde::{Deserialize, Serialize};
 

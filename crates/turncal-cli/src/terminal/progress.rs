@@ -32,7 +32,7 @@ impl Activity {
         self.bar.set_message(printable(&message.into()));
     }
 
-    /// Shows that the filter performs a pass.
+    /// Shows a message while the filter runs.
     pub fn pass(&self, pass: &Pass) {
         let step = pass.largest_step;
         self.next(format!("iteration done, largest step {step:.2} σ"));

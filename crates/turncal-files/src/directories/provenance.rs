@@ -8,8 +8,8 @@ use turncal::calibration::Calibration;
 use turncal::calibration::result::InputFile;
 use turncal::run::Run;
 
-/// Records the inputs of a calibration with their digests: the files named in a run.toml or campaign.toml, or all files
-/// of the logs.
+/// Records the inputs of a calibration with their digests: the files named in a run.toml or campaign.toml, or every
+/// log.
 pub fn record_inputs<'a>(
     calibration: &mut Calibration,
     paths: impl IntoIterator<Item = &'a Path>,

@@ -155,7 +155,7 @@ impl Draft {
         let (path, clock) = ("imu.sample_period_s", &self.clock);
         let Some(period) = clock.period else {
             if !self.rows_show_period() {
-                let why = "time between rows in s, which a counter does not show";
+                let why = "time between rows in s; a counter does not give it";
                 remarks.open(path, why);
             }
             return None;

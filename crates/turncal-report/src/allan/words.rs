@@ -1,4 +1,4 @@
-//! Sentences about an analysis.
+//! Text that describes an analysis.
 
 use super::quantity::quantity;
 use crate::prelude::*;
