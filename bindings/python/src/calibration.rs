@@ -3,9 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
+use numpy::PyArray1;
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
-use pyo3::types::PyIterator;
+use pyo3::types::{PyDict, PyIterator};
 use turncal::calibration;
 use turncal::calibration::{Correction, Finding, Progress as Passes};
 use turncal::imu::{Output, Sensor, Term};
@@ -84,7 +85,7 @@ pub fn calibrated(
     let solution = problem.solve(request.method, progress)?;
     let mut checked = CheckedCalibration::new(&problem, solution)?;
     if let Some(path) = &of.path {
-        record_inputs(&mut checked.calibration, path, problem.run());
+        record_inputs(&mut checked.calibration, [path.as_path()], problem.run());
     }
     drop(problem);
     let record = checked.calibration.clone();
@@ -326,6 +327,22 @@ impl Calibration {
     fn correction<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let by = Correction::of_record(&self.record).map_err(raise)?;
         values::matrices(py, &by.matrix)
+    }
+
+    /// The magnetometer: ``matrix``, ``bias`` and ``correction`` of ``N = matrix · field + bias`` and
+    /// ``field = correction · (N − bias)``, with the units of N and field; None if it was not calibrated.
+    #[getter]
+    fn magnetometer<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let Some(mag) = &self.record.mag else {
+            return Ok(None);
+        };
+        let all = PyDict::new(py);
+        all.set_item("matrix", values::matrix(py, &mag.matrix))?;
+        all.set_item("bias", PyArray1::from_slice(py, &mag.bias))?;
+        all.set_item("correction", values::matrix(py, &mag.correction))?;
+        all.set_item("unit", &mag.unit)?;
+        all.set_item("field_unit", &mag.field.unit)?;
+        Ok(Some(all))
     }
 
     /// "good", "use with care", "partial" (some of K, E and D were not determined) or "failed"; None for values that were not estimated.

@@ -24,10 +24,14 @@ pub fn vectors<'py>(
 pub fn matrices<'py>(py: Python<'py>, of: &PerSensor<Matrix3<f64>>) -> PyResult<Bound<'py, PyAny>> {
     let array = |sensor| {
         let of = of.get(sensor);
-        let rows = Array2::from_shape_fn((3, 3), |(i, j)| of[(i, j)]);
-        PyArray2::from_owned_array(py, rows).into_any()
+        matrix(py, &of.transpose().data.0).into_any()
     };
     per_sensor(py, Sensor::ALL.map(array))
+}
+
+/// A matrix, given by its rows, as an array of Python.
+pub fn matrix<'py>(py: Python<'py>, rows: &[[f64; 3]; 3]) -> Bound<'py, PyArray2<f64>> {
+    PyArray2::from_owned_array(py, Array2::from(rows.to_vec()))
 }
 
 fn per_sensor<'py>(py: Python<'py>, of: [Bound<'py, PyAny>; 2]) -> PyResult<Bound<'py, PyAny>> {

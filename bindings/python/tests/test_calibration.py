@@ -240,3 +240,12 @@ def test_a_certificate_is_written(calibration, tmp_path):
     (tmp_path / "lab.toml").write_bytes(command("certificate", "--draft"))
     with pytest.raises(turncal.Error, match="lab.toml"):
         turncal.certificate(calibration, tmp_path / "lab.toml", tmp_path / "paper")
+
+
+def test_the_magnetometer_has_matrix_bias_and_correction_with_units(calibration):
+    assert calibration.magnetometer is None
+    found = turncal.simulate("nine-axis").calibrate()
+    mag = found.magnetometer
+    assert (mag["unit"], mag["field_unit"]) == ("uT", "T")
+    assert mag["matrix"][0, 1] == found["mag.matrix.xy"] and mag["bias"][2] == found["mag.bias.z"]
+    np.testing.assert_allclose(mag["correction"] @ mag["matrix"], np.eye(3), atol=1e-12)
