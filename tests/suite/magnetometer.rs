@@ -3,15 +3,18 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::fs;
+use std::io::{BufRead, BufReader};
 use std::path::Path;
 
 use crate::export::{numbers, record, text_of};
+use flate2::read::GzDecoder;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use turncal::calibration::result::{Calibration, FieldRecord, MagRecord};
 use turncal::calibration::{Method, Options, Problem, UNWATCHED};
 use turncal::magnetic::LocalField;
 use turncal::recording::Magnetometer;
 use turncal::simulation::{MagnetometerModel, Scenario, Simulated};
+use turncal_files::draft::Draft;
 use turncal_files::{calibration_json, read_calibration, read_run, write_run};
 
 /// Fixed before the first run was made.
@@ -326,4 +329,47 @@ fn counts_and_whole_matrices_go_where_a_program_takes_them() {
         notes.iter().any(|note| note.contains("no rotation")),
         "{notes:?}"
     );
+}
+
+#[test]
+fn a_draft_has_the_magnetometer_of_the_rows_or_of_a_stream_with_a_clock_of_its_own() {
+    let made = simulated();
+    let directory = tempfile::tempdir().unwrap();
+    write_run(directory.path(), &made.run, made.output, None).unwrap();
+    let log = directory.path().join("imu.csv.gz");
+    let draft = Draft::of_file(&log).unwrap().to_toml("imu.csv.gz");
+    assert!(draft.contains("mag = [\"mx\", \"my\", \"mz\"]"), "{draft}");
+    assert!(draft.contains("mag_unit = \"uT\""), "{draft}");
+    // The clock of a logger does not begin at zero.
+    let mut text = String::new();
+    let unpacked = GzDecoder::new(fs::File::open(&log).unwrap());
+    for line in BufReader::new(unpacked).lines().skip(1) {
+        let line = line.unwrap();
+        let words: Vec<&str> = line.split(',').collect();
+        let time = 864e5 + 1e3 * words[0].parse::<f64>().unwrap();
+        writeln!(text, "IMU,{time:.3},{}", words[1..7].join(",")).unwrap();
+        if !words[7].is_empty() {
+            writeln!(text, "MAG,{time:.3},{}", words[7..].join(",")).unwrap();
+        }
+    }
+    let tagged = directory.path().join("tagged.txt");
+    fs::write(&tagged, text).unwrap();
+    let run = directory.path().join("run.toml");
+    fs::write(&run, Draft::of_file(&tagged).unwrap().to_toml("tagged.txt")).unwrap();
+    let read = read_run(&run).unwrap().recording;
+    let [written, found] = [&made.run.recording, &read].map(|of| {
+        let first = of.imu.start();
+        let all = values(of.magnetometer.as_ref().unwrap());
+        all.into_iter()
+            .map(move |(time, value)| (time - first, value))
+            .collect::<Vec<_>>()
+    });
+    assert!(written.len().abs_diff(found.len()) <= 1);
+    for ((time, value), (at, read)) in written.iter().zip(&found) {
+        // Half a span, and a row that ends at its time.
+        assert!(
+            (time - at).abs() < 0.07 && (value - read).norm() < 1e-6,
+            "{time} {at}"
+        );
+    }
 }

@@ -26,14 +26,35 @@ impl MagnetometerColumns {
         let all = by_stem(names, &candidates);
         let unit = |triad: &[usize; 3]| names[triad[0]].unit.and_then(|unit| word(unit.word));
         let columns = all.into_iter().min_by_key(|triad| unit(triad).is_none())?;
-        let (unit, why) = match unit(&columns) {
-            Some(unit) => (unit, "stated in the file"),
-            None => (
-                by_size(sheet, columns)?,
-                "guess: with this unit, the values are most like the field of the Earth",
-            ),
-        };
-        Some(Self { columns, unit, why })
+        match unit(&columns) {
+            None => Self::by_size(sheet, columns),
+            Some(unit) => Some(Self {
+                columns,
+                unit,
+                why: "stated in the file",
+            }),
+        }
+    }
+
+    /// The triad of a stream that is named as a magnetometer and has only three columns beside its time.
+    pub fn alone(sheet: &Sheet, time: &str) -> Option<Self> {
+        let is = |k: &usize| sheet.names[*k] != time && sheet.varies(*k);
+        let columns: Vec<usize> = (0..sheet.names.len()).filter(is).collect();
+        Self::by_size(sheet, columns.try_into().ok()?)
+    }
+
+    /// These columns, in the unit in which their values are most like the field of the Earth.
+    fn by_size(sheet: &Sheet, columns: [usize; 3]) -> Option<Self> {
+        let value = |row| Vector3::from(columns.map(|k| sheet.columns[k][row])).norm();
+        let sizes = (0..sheet.rows()).map(value).filter(|size| *size > 0.0);
+        let size = median(&mut sizes.collect::<Vec<_>>())?;
+        let off = |(_, per_tesla): &(&str, f64)| (size / per_tesla / FIELD).ln().abs();
+        let (word, _) = units_of_field().min_by(|one, other| off(one).total_cmp(&off(other)))?;
+        Some(Self {
+            columns,
+            unit: if word == "mG" { "count" } else { word },
+            why: "guess: with this unit, the values are most like the field of the Earth",
+        })
     }
 }
 
@@ -47,14 +68,4 @@ fn word(of_column: &'static str) -> Option<&'static str> {
     units_of_field()
         .map(|(name, _)| name)
         .find(|name| *name == word)
-}
-
-/// The unit in which the values are most like the field of the Earth.
-fn by_size(sheet: &Sheet, columns: [usize; 3]) -> Option<&'static str> {
-    let value = |row| Vector3::from(columns.map(|k| sheet.columns[k][row])).norm();
-    let sizes = (0..sheet.rows()).map(value).filter(|size| *size > 0.0);
-    let size = median(&mut sizes.collect::<Vec<_>>())?;
-    let off = |(_, per_tesla): &(&str, f64)| (size / per_tesla / FIELD).ln().abs();
-    let nearest = units_of_field().min_by(|one, other| off(one).total_cmp(&off(other)));
-    nearest.map(|(word, _)| if word == "mG" { "count" } else { word })
 }

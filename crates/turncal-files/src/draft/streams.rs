@@ -344,10 +344,15 @@ impl Member {
             .iter()
             .map(|name| Name::of(name))
             .collect();
-        names.iter().find(|name| name.is_magnetic())?;
+        let is_named = Name::of(&self.found.stream.name).is_magnetic();
+        if !is_named && !names.iter().any(Name::is_magnetic) {
+            return None;
+        }
         let source = self.source(salvage);
         let sheet = Sheet::of(source.open().ok()?, FEWEST_ROWS).ok()?;
-        let found = MagnetometerColumns::find(&sheet, &names)?;
+        let (time, _) = self.time.as_ref()?;
+        let alone = || MagnetometerColumns::alone(&sheet, time).filter(|_| is_named);
+        let found = MagnetometerColumns::find(&sheet, &names).or_else(alone)?;
         let name = |k: usize| self.found.stream.columns[k].name.clone();
         Some(MagnetometerStream {
             stream: self.found.stream.name.clone(),

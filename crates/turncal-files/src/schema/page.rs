@@ -6,7 +6,7 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 
 /// Tables written inline, after the name of a field.
-const INLINE: [&str; 3] = ["accel_from", "columns", "instance"];
+const INLINE: [&str; 4] = ["accel_from", "columns", "instance", "mag_from"];
 
 /// Comments on fields and tables; the key is the path of the field, `table.field`.
 #[derive(Debug, Default)]
