@@ -30,7 +30,8 @@ const G: f64 = STANDARD_GRAVITY;
 
 /// Every term of which the calibration has a value.
 pub fn table(calibration: &Calibration) -> Table {
-    let sections = [accel(calibration), gyro(calibration)];
+    let gyro = gyro(calibration).into_iter().chain(gyro_drift());
+    let sections = [accel(calibration), gyro.collect()];
     let sections = sections.map(|entries| {
         let rows = entries.iter().filter_map(|entry| row(calibration, entry));
         rows.collect::<Vec<_>>()
@@ -116,8 +117,6 @@ fn gyro(calibration: &Calibration) -> Vec<Entry> {
     let (scale, bias) = ((Inverse(size), scale.as_str()), (ByScale(DEG_PER_H), "°/h"));
     let ppm = (Times(-2.0 / PPM), "ppm");
     let [twice, once] = [-2.0, -1.0].map(|by| (Times(by / PPM), "ppm at 100 °/s"));
-    let first = (Times(G / DEG_PER_H), "°/h/g");
-    let second = (Times(G.powi(2) / DEG_PER_H), "°/h/g²");
     let arcsec = (Times(1.0 / ARCSEC), "″");
     let by_rate = "(S₊ − S₋) / S, proportional to rate: −2 q";
     let [linear, square] = [
@@ -153,6 +152,14 @@ fn gyro(calibration: &Calibration) -> Vec<Entry> {
             arcsec,
             "input axis turned towards o: E to o",
         ),
+    ]
+}
+
+/// Drift of the gyros by specific force.
+fn gyro_drift() -> [Entry; 4] {
+    let first = (Times(G / DEG_PER_H), "°/h/g");
+    let second = (Times(G.powi(2) / DEG_PER_H), "°/h/g²");
+    [
         entry(
             "gyro D_I",
             "gyro.g_sensitivity.ii",

@@ -106,14 +106,14 @@ impl Event {
             ..
         } = self;
         let number = dwell + 1;
-        let (kind, text) = self.kind.words(number, *time, self.size);
+        let text = self.kind.words(number, *time, self.size);
         let shown = three_digits(*significance);
         let text = format!("{text} (significance {shown}; limit {limit:.0}).");
         let figures = json!({
             "dwell": number, "time_s": time, "size": self.size,
             "significance": significance, "limit": limit
         });
-        Finding::new(kind, text, figures)
+        Finding::new(self.kind.kind(), text, figures)
     }
 }
 
@@ -183,69 +183,61 @@ impl EventKind {
     }
 
     /// Kind and text of the finding.
-    fn words(self, number: usize, time: f64, size: f64) -> (Kind, String) {
+    fn kind(self) -> Kind {
+        match self {
+            Self::Position => Kind::PositionWrong,
+            Self::Move => Kind::MoveWrong,
+            Self::Velocity => Kind::VelocityWrong,
+            Self::BiasStep(_) => Kind::BiasStep,
+            Self::Field => Kind::FieldDisturbed,
+            Self::Slip(_) => Kind::Slipped,
+        }
+    }
+
+    fn words(self, number: usize, time: f64, size: f64) -> String {
         let angle = angle(size);
         match self {
-            Self::Position => (
-                Kind::PositionWrong,
-                format!(
-                    "The table readings in dwell {number} (at {time:.1} s) are wrong by {angle}. turncal gave these \
-                     readings next to no weight. Check the table log around this time for a bump or a wrong reading"
-                ),
+            Self::Position => format!(
+                "The table readings in dwell {number} (at {time:.1} s) are wrong by {angle}. turncal gave these readings \
+                 next to no weight. Check the table log around this time for a bump or a wrong reading"
             ),
-            Self::Move => (
-                Kind::MoveWrong,
-                format!(
-                    "In the move before dwell {number} (at {time:.1} s), the gyros missed a turn of {angle}. turncal \
-                     estimated this angle. Check the log around this time for lost samples, rates beyond the \
-                     measuring range, or a loose mount"
-                ),
+            Self::Move => format!(
+                "In the move before dwell {number} (at {time:.1} s), the gyros missed a turn of {angle}. turncal \
+                 estimated this angle. Check the log around this time for lost samples, rates beyond the measuring \
+                 range, or a loose mount"
             ),
-            Self::Velocity => (
-                Kind::VelocityWrong,
-                format!(
-                    "In the move before dwell {number} (at {time:.1} s), the accelerometers missed a velocity of \
-                     {size:.2e} m/s. turncal estimated this velocity. Check the log around this time for lost \
-                     samples, forces beyond the measuring range, or a bump"
-                ),
+            Self::Velocity => format!(
+                "In the move before dwell {number} (at {time:.1} s), the accelerometers missed a velocity of {size:.2e} \
+                 m/s. turncal estimated this velocity. Check the log around this time for lost samples, forces beyond \
+                 the measuring range, or a bump"
             ),
             Self::BiasStep(sensor) => {
                 let (unit, name) = match sensor {
                     Sensor::Gyro => (DEG_PER_H, "°/h"),
                     Sensor::Accel => (MICRO_G, "µg"),
                 };
-                let (sensor, size) = (sensor.name(), size / unit);
-                (
-                    Kind::BiasStep,
-                    format!(
-                        "Before dwell {number} (at {time:.1} s), the {sensor} biases changed by about {} {name}. \
-                         The calibration contains the mean bias over the recording. Check the log around this time \
-                         for a shock, or for a sudden change of temperature or supply voltage",
-                        three_digits(size)
-                    ),
+                let (sensor, size) = (sensor.name(), three_digits(size / unit));
+                format!(
+                    "Before dwell {number} (at {time:.1} s), the {sensor} biases changed by about {size} {name}. The \
+                     calibration contains the mean bias over the recording. Check the log around this time for a shock, \
+                     or for a sudden change of temperature or supply voltage"
                 )
             }
-            Self::Field => (
-                Kind::FieldDisturbed,
-                format!(
-                    "In dwell {number} (at {time:.1} s) the magnetic field is off by {:.2} % of the local field. turncal \
-                     gave the magnetometer next to no weight there. Keep steel, magnets and currents away, or hold the \
-                     instrument elsewhere",
-                    100.0 * size
-                ),
+            Self::Field => format!(
+                "In dwell {number} (at {time:.1} s) the magnetic field is off by {:.2} % of the local field. turncal \
+                 gave the magnetometer next to no weight there. Keep steel, magnets and currents away, or hold the \
+                 instrument elsewhere",
+                100.0 * size
             ),
             Self::Slip(slip) => {
                 let what = match slip {
                     Slip::Mount => "the instrument slipped on the table",
                     Slip::Base => "the table turned on the ground",
                 };
-                (
-                    Kind::Slipped,
-                    format!(
-                        "Before dwell {number} (at {time:.1} s), {what} by {angle}. turncal estimated this angle; the \
-                         misalignments refer to the mounting before this event. Fasten the instrument and the table, \
-                         and repeat the recording"
-                    ),
+                format!(
+                    "Before dwell {number} (at {time:.1} s), {what} by {angle}. turncal estimated this angle; the \
+                     misalignments refer to the mounting before this event. Fasten the instrument and the table, and \
+                     repeat the recording"
                 )
             }
         }

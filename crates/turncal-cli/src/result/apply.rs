@@ -127,6 +127,21 @@ impl Apply {
     }
 }
 
+/// Remark on a magnetometer in another unit than that of the calibration.
+fn other_magnetometer(record: &Calibration, run: &Run) -> Option<String> {
+    let (own, log) = record
+        .mag
+        .as_ref()
+        .zip(run.recording.magnetometer.as_ref())?;
+    let (own, other) = (&own.unit, &log.unit);
+    (own != other).then(|| {
+        format!(
+            "the magnetometer was calibrated in {own}, but the run has {other}: turncal left it out; set mag_unit in \
+             run.toml to {own}"
+        )
+    })
+}
+
 fn notes(record: &Calibration, correction: &Correction, run: &Run) -> Vec<String> {
     let mut notes = Vec::new();
     let kept: Vec<&str> = record.undetermined().map(String::as_str).collect();
@@ -142,18 +157,7 @@ fn notes(record: &Calibration, correction: &Correction, run: &Run) -> Vec<String
                 .to_owned(),
         );
     }
-    let in_run = run.recording.magnetometer.as_ref();
-    let units = record
-        .mag
-        .as_ref()
-        .zip(in_run)
-        .map(|(of, log)| (&of.unit, &log.unit));
-    if let Some((own, other)) = units.filter(|(own, other)| own != other) {
-        notes.push(format!(
-            "the magnetometer was calibrated in {own}, but the run has {other}: turncal left it out; set mag_unit in \
-             run.toml to {own}"
-        ));
-    }
+    notes.extend(other_magnetometer(record, run));
     for sensor in Sensor::ALL {
         let scale = correction.sensitivity.get(sensor).diagonal();
         let off = scale

@@ -2,9 +2,9 @@
 
 use nalgebra::Vector3;
 
-use super::magnetometer::MagnetometerColumns;
 use super::name::{Name, by_stem};
 use super::stated::StatedColumns;
+use super::triads::MagnetometerColumns;
 use super::triads::{Doubt, Identified, Triad, consecutive, is_uneven, overlap};
 use crate::Sheet;
 use crate::quantity::Of;

@@ -4,7 +4,6 @@
 mod columns;
 mod convert;
 mod found;
-mod magnetometer;
 mod motion;
 mod name;
 mod priors;

@@ -1,9 +1,9 @@
 //! Selects the streams or files that contain the data of the instrument.
 
 use super::columns::{self, Columns};
-use super::magnetometer::MagnetometerColumns;
 use super::name::{Name, by_stem};
 use super::time;
+use super::triads::MagnetometerColumns;
 use super::triads::{Triad, uneven};
 use crate::Sheet;
 use crate::joined;

@@ -6,9 +6,11 @@
 //! of the gyro axes, is a hypothesis; they are compared by their likelihoods on the same rows.
 
 mod fit;
+mod magnetometer;
 
 pub use fit::Triad;
 use fit::{Moments, Order};
+pub use magnetometer::MagnetometerColumns;
 use nalgebra::Vector3;
 
 use turncal::imu::{Output, PerSensor, Sensor};

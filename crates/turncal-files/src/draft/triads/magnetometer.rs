@@ -2,8 +2,8 @@
 
 use nalgebra::Vector3;
 
-use super::name::{Name, by_stem};
 use crate::Sheet;
+use crate::draft::name::{Name, by_stem};
 use crate::quantity::units_of_field;
 use turncal::statistics::median;
 
