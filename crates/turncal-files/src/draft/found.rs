@@ -25,13 +25,14 @@ pub struct Found {
 impl Draft {
     /// All detected fields, in the order in which they are displayed.
     pub fn found(&self) -> Vec<Found> {
-        vec![
+        let mut found = vec![
             self.time_found(),
             self.triad_found(Sensor::Gyro),
             self.triad_found(Sensor::Accel),
-            self.axes_found(),
-            self.place_found(),
-        ]
+        ];
+        found.extend(self.magnetometer_found());
+        found.extend([self.axes_found(), self.place_found()]);
+        found
     }
 
     /// Fails for a damaged log, and for a field that the log does not show but a run needs.
@@ -173,6 +174,27 @@ impl Draft {
             why += &format!("; at the start {}", self.down_words(down));
         }
         Found::new(what, value, certainty, why)
+    }
+
+    fn magnetometer_found(&self) -> Option<Found> {
+        let of_streams = self
+            .streams
+            .as_ref()
+            .and_then(|of| of.magnetometer.as_ref());
+        let (names, of) = match (of_streams, &self.columns.magnetometer) {
+            (Some(stream), _) => (stream.names.clone(), &stream.found),
+            (None, of) => {
+                let of = of.as_ref()?;
+                (of.columns.map(|k| self.columns.names[k].clone()), of)
+            }
+        };
+        let certainty = if of.is_stated {
+            Certainty::Certain
+        } else {
+            Certainty::Guess
+        };
+        let value = format!("{}, {}", names.join(" "), of.unit);
+        Some(Found::new("mag", value, certainty, of.why()))
     }
 
     fn axes_found(&self) -> Found {

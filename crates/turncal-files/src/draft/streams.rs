@@ -45,10 +45,10 @@ pub struct Streams {
 #[derive(Debug, Clone, PartialEq)]
 pub struct MagnetometerStream {
     stream: String,
-    names: [String; 3],
+    pub names: [String; 3],
     /// Time column and its unit.
     time: (String, String),
-    found: MagnetometerColumns,
+    pub found: MagnetometerColumns,
 }
 
 /// Text files written from a log.
@@ -249,7 +249,7 @@ impl Streams {
                 time_unit: Some(TimeUnitField::of_text(unit)),
                 ..AccelFromFile::default()
             });
-            remarks.reason("imu.mag_unit", of.found.why);
+            remarks.reason("imu.mag_unit", of.found.why());
         }
         for remark in &self.remarks {
             remarks.before("imu.salvage", remark);

@@ -106,7 +106,7 @@ impl Draft {
             ..ImuFile::default()
         };
         if let Some(of) = magnetometer {
-            remarks.reason("imu.mag_unit", of.why);
+            remarks.reason("imu.mag_unit", of.why());
         }
         if let Some(streams) = &self.streams {
             streams.describe(&mut imu, remarks);

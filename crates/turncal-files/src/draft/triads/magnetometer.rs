@@ -15,7 +15,8 @@ const FIELD: f64 = 45e-6;
 pub struct MagnetometerColumns {
     pub columns: [usize; 3],
     pub unit: &'static str,
-    pub why: &'static str,
+    /// Whether the file states the unit.
+    pub is_stated: bool,
 }
 
 impl MagnetometerColumns {
@@ -31,7 +32,7 @@ impl MagnetometerColumns {
             Some(unit) => Some(Self {
                 columns,
                 unit,
-                why: "stated in the file",
+                is_stated: true,
             }),
         }
     }
@@ -53,8 +54,17 @@ impl MagnetometerColumns {
         Some(Self {
             columns,
             unit: if word == "mG" { "count" } else { word },
-            why: "guess: with this unit, the values are most like the field of the Earth",
+            is_stated: false,
         })
+    }
+
+    /// The reason for the unit.
+    pub fn why(&self) -> &'static str {
+        if self.is_stated {
+            "stated in the file"
+        } else {
+            "with this unit, the values are most like the field of the Earth"
+        }
     }
 }
 
