@@ -214,14 +214,16 @@ impl Draft {
             stated,
             written,
         };
+        let first = rates.rows(&clock);
         let has_times = streams.as_ref().is_some_and(|of| of.time.is_some());
         let (clock, contradiction) = if has_times {
             (clock, None)
         } else {
-            rates.agreed(clock)
+            rates.agreed(clock, first.as_ref())
         };
         let contradiction = contradiction.or_else(|| no_time(&sheet, &columns, &clock));
-        let rows = rates.rows(&clock);
+        let is_same = |rows: &RawSamples| rows.period == rates::period(&clock);
+        let rows = first.filter(is_same).or_else(|| rates.rows(&clock));
         let down = rows.as_ref().and_then(RawSamples::points_down);
         let mut draft = Self {
             down: down.and_then(|axis| Some(columns.triads.accel?[axis])),
@@ -257,7 +259,7 @@ impl Draft {
 
     /// Detects units and noise.
     fn take_rows(&mut self, rows: &RawSamples, sheet: &Sheet) {
-        let motion = rows.motion();
+        let motion = rows.motion().clone();
         self.quantities = Quantities::find(sheet, &self.columns, &self.clock, rows.whole, &motion);
         if self.quantities.has_counts() {
             self.blocked = rows.unfit();

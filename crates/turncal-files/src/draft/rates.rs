@@ -22,6 +22,11 @@ pub struct Rates<'a> {
     pub written: Option<f64>,
 }
 
+/// The sample period, s, or a usual one if the clock has none.
+pub fn period(clock: &Clock) -> f64 {
+    clock.period.unwrap_or(USUAL_PERIOD)
+}
+
 fn are_near(one: f64, other: f64, factor: f64) -> bool {
     (one / other).ln().abs() < factor.ln()
 }
@@ -30,15 +35,17 @@ impl Rates<'_> {
     /// The rows to which a clock applies.
     pub fn rows(&self, clock: &Clock) -> Option<RawSamples> {
         let (numbers, triads) = self.columns.samples(self.sheet)?;
-        let period = clock.period.unwrap_or(USUAL_PERIOD);
+        let period = period(clock);
         let breaks = clock.breaks(&numbers, period, FOLLOWED);
         Some(RawSamples::new(triads, breaks, period))
     }
 
     /// Returns the clock that agrees with most of the information, with a doubt if information in the file was
-    /// rejected. Also returns the evidence against information from the user, with this information and the remedy.
-    pub fn agreed(&self, clock: Clock) -> (Clock, Option<[String; 3]>) {
-        let told = clock.period.zip(self.shown(&clock));
+    /// rejected; `rows` are those to which the given clock applies. Also returns the evidence against information from the user, with this information and the remedy.
+    pub fn agreed(&self, clock: Clock, rows: Option<&RawSamples>) -> (Clock, Option<[String; 3]>) {
+        let told = clock
+            .period
+            .zip(rows.and_then(|rows| self.shown(&clock, rows)));
         let contradiction = (self.stated.rate_hz).and_then(|rate| clock.contradiction(rate));
         let Some((period, (shown, is_another_unit))) = told else {
             return match contradiction {
@@ -87,24 +94,24 @@ impl Rates<'_> {
 
     /// The period that turns show in the unit of the gyros, s, and whether they fit another unit at the period of the
     /// clock.
-    fn shown(&self, clock: &Clock) -> Option<(f64, bool)> {
-        let (rows, period) = (self.rows(clock)?, clock.period?);
+    fn shown(&self, clock: &Clock, rows: &RawSamples) -> Option<(f64, bool)> {
+        let period = clock.period?;
         let found = |clock: &Clock, motion: &Motion| {
             Quantities::find(self.sheet, self.columns, clock, rows.whole, motion)
         };
         let motion = rows.motion();
         let triad = self.columns.triads.gyro?;
         let named = Name::of_column(&self.sheet.names[triad[0]], &self.sheet.units[triad[0]]).unit;
-        let quantities = found(clock, &motion);
+        let quantities = found(clock, motion);
         let angle = |motion: &Motion| quantities.turned_period(self.stated, named, motion);
-        let shown = angle(&motion)?;
+        let shown = angle(motion)?;
         let is_another = named.is_some() && quantities.units.get(Sensor::Gyro).is_shown;
         if are_near(shown, period, TURNS_TOLD_APART) {
             return Some((shown, is_another));
         }
         // Windows at rest are as long as the clock makes them.
         let again = self.rows(&clock.clone().given_up(shown, 0.0, false))?;
-        Some((angle(&again.motion()).unwrap_or(shown), is_another))
+        Some((angle(again.motion()).unwrap_or(shown), is_another))
     }
 
     /// A stated rate that turns contradict.

@@ -1,5 +1,7 @@
 //! Rows of both triads as signed numbers, relative to the nominal zero of their registers.
 
+use std::cell::OnceCell;
+
 use nalgebra::Vector3;
 
 use super::motion::{Motion, WINDOW, is_whole, mean};
@@ -21,6 +23,7 @@ pub struct RawSamples {
     wrapped: PerSensor<bool>,
     /// Nominal register zero.
     pub offset: PerSensor<f64>,
+    motion: OnceCell<Motion>,
 }
 
 impl RawSamples {
@@ -40,11 +43,13 @@ impl RawSamples {
             whole,
             wrapped,
             offset,
+            motion: OnceCell::new(),
         }
     }
 
-    pub fn motion(&self) -> Motion {
-        Motion::find(&self.triads, &self.breaks, self.period)
+    pub fn motion(&self) -> &Motion {
+        let find = || Motion::find(&self.triads, &self.breaks, self.period);
+        self.motion.get_or_init(find)
     }
 
     /// The motion that would result if the two triads were swapped.
