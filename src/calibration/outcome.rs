@@ -134,7 +134,8 @@ impl Outcome {
             auxiliary: auxiliary(&weighed, &solved, &problem.model),
             thermal: posterior.thermal(&script.at, &problem.model),
             own: own(filtered, posterior, &script.at),
-            magnetic: MagneticEstimate::new(posterior, &script.at, &problem.model),
+            magnetic: MagneticEstimate::new(posterior, &script.at, &problem.model)
+                .filter(MagneticEstimate::is_shown),
             gravity: (problem.run().site.gravity + off, gravity_sigma),
             terms: TermEvidence::all(&weighed, &effects.candidates, &problem.model),
             events: Event::all(problem, &weighed),

@@ -373,3 +373,27 @@ fn a_draft_has_the_magnetometer_of_the_rows_or_of_a_stream_with_a_clock_of_its_o
         );
     }
 }
+
+#[test]
+fn an_output_that_does_not_depend_on_the_field_is_no_magnetometer() {
+    let mut made = simulated();
+    let log = made.run.recording.magnetometer.as_mut().unwrap();
+    let mut noise = Magnetometer::new(&log.unit, log.nominal);
+    noise.field = log.field;
+    for (k, (time, _)) in log.values().enumerate() {
+        let phase = (k * k) as f64;
+        let value = Vector3::new(phase.sin(), (3.0 * phase).cos(), (2.0 * phase + 1.0).sin());
+        noise.push(time, value);
+    }
+    *log = noise;
+    let problem = Problem::new(&made.run, &Options::default());
+    let solution = problem.solve(Method::Ekf, UNWATCHED).unwrap();
+    let assessment = solution.assess(&problem).unwrap();
+    let record = solution.calibration(&problem, &assessment);
+    assert!(record.mag.is_none());
+    assert!(
+        record.findings.iter().any(|of| of.code == "W38"),
+        "{:?}",
+        record.findings
+    );
+}

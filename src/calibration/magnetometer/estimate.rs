@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, SMatrix};
 use crate::calibration::constants::parameters;
 use crate::calibration::{Constant, Linearisation, Model, PARAMETERS, Posterior};
 use crate::magnetic::{MAGNETIC, MagneticTriad, MagneticVector};
+use crate::statistics::{FALSE_ALARM, chi_square_limit};
 
 /// Covariance of the constants of a magnetometer.
 pub type MagneticMatrix = SMatrix<f64, MAGNETIC, MAGNETIC>;
@@ -52,6 +53,17 @@ impl MagneticEstimate {
             magnitude: model.magnetic.magnitude,
             covariance,
             cross,
+        })
+    }
+
+    /// Whether the output of each axis depends on the field.
+    pub fn is_shown(&self) -> bool {
+        let limit = chi_square_limit(3.0, FALSE_ALARM);
+        (0..3).all(|axis| {
+            let row = self.triad.matrix.row(axis).transpose();
+            let own = self.covariance.fixed_view::<3, 3>(3 * axis, 3 * axis);
+            let solved = own.into_owned().cholesky().map(|of| of.solve(&row));
+            solved.is_some_and(|solved| row.dot(&solved) > limit)
         })
     }
 

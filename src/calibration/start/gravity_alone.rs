@@ -178,7 +178,8 @@ impl Positions<'_> {
                 }),
             });
         }
-        Ok(Alone::new(&all, &self.problem.model.magnetic))
+        let found = Alone::new(&all, &self.problem.model.magnetic);
+        Ok(found.filter(|of| of.estimate.is_shown()))
     }
 
     /// Every dwell, with the number of its stretch.
