@@ -155,6 +155,24 @@ fn calibration_json_corrects_the_output_to_the_field_and_older_readers_find_what
         assert!(error.abs() < 4.5 * read.sigma_of(&name).unwrap(), "{name}");
     }
     assert_eq!(mag.parameters.len(), mag.covariance.len());
+    // What was edited in one place contradicts another.
+    let edits: [(fn(&mut MagRecord), &str); 4] = [
+        (
+            |mag| mag.matrix[0][1] *= 2.0,
+            "mag.correction · mag.matrix = 1",
+        ),
+        (|mag| mag.covariance[3][3] *= 2.0, "the square of mag.sigma"),
+        (|mag| mag.covariance.truncate(5), "rows of"),
+        (|mag| "Gs".clone_into(&mut mag.unit), "mG"),
+    ];
+    for (edit, expected) in edits {
+        let mut edited = record.clone();
+        edit(edited.mag.as_mut().unwrap());
+        let other = directory.path().join("edited.json");
+        fs::write(&other, serde_json::to_vec(&edited).unwrap()).unwrap();
+        let error = read_calibration(&other).unwrap_err().to_string();
+        assert!(error.contains(expected), "{error}");
+    }
     let variance = mag.covariance[11][11];
     assert!((variance.sqrt() / read.sigma_of("mag.bias.z").unwrap() - 1.0).abs() < 1e-9);
     assert!(read.parameters.iter().all(|name| !name.starts_with("mag")));

@@ -4,13 +4,13 @@ use std::iter::zip;
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::quantity::{Of, spelled};
-use turncal::calibration::result::{Calibration, ConsistencyRecord, NisRecord};
+use crate::quantity::{Of, spelled, units_of_field};
+use turncal::calibration::result::{Calibration, ConsistencyRecord, MagRecord, NisRecord};
 use turncal::calibration::{
     BudgetPartRecord, BudgetRecord, FindingKind, Verdict, Word, coverage_factor,
 };
 use turncal::imu::Sensor;
-use turncal_input::counted;
+use turncal_input::{counted, list};
 
 /// An error, with the content found and the content expected.
 pub type Wrong = (String, String);
@@ -35,6 +35,9 @@ pub fn check_agreement(record: &Calibration) -> Checked {
     check_verdict(record)?;
     if let Some(consistency) = &record.consistency {
         check_nis(record, consistency)?;
+    }
+    if let Some(mag) = &record.mag {
+        check_magnetometer(mag)?;
     }
     for sensor in Sensor::ALL {
         check_unit(record, sensor)?;
@@ -197,6 +200,39 @@ fn check_inverse(record: &Calibration, sensor: Sensor) -> Checked {
         "correction.{0} and {0}.scale · {0}.installation, whose product differs from 1 by {off:.3e}",
         sensor.name()
     );
+    Ok(())
+}
+
+fn check_magnetometer(mag: &MagRecord) -> Checked {
+    let units: Vec<&str> = units_of_field().map(|(name, _)| name).collect();
+    expect!(
+        units.contains(&mag.unit.as_str()),
+        format!("one of {}", list(units)),
+        "mag.unit = {:?}",
+        mag.unit
+    );
+    let [correction, matrix] =
+        [mag.correction, mag.matrix].map(|of| Matrix3::from_fn(|i, j| of[i][j]));
+    let off = (correction * matrix - Matrix3::identity()).amax();
+    expect!(
+        off <= INVERSE,
+        "mag.correction · mag.matrix = 1",
+        "mag.correction and mag.matrix, whose product differs from 1 by {off:.3e}"
+    );
+    let size = mag.parameters.len();
+    expect!(
+        mag.covariance.len() == size && mag.covariance.iter().all(|row| row.len() == size),
+        format!("{size} rows of {size} values, as many as mag.parameters"),
+        "another size of mag.covariance"
+    );
+    for (n, name) in mag.parameters.iter().enumerate() {
+        let (sigma, variance) = (mag.sigma_of(name), mag.covariance[n][n]);
+        expect!(
+            sigma.is_some_and(|sigma| is_near(sigma * sigma, variance, RELATIVE)),
+            "the square of mag.sigma on the diagonal of mag.covariance",
+            "sigma of {name} = {sigma:?}, but its variance in mag.covariance = {variance:e}"
+        );
+    }
     Ok(())
 }
 
