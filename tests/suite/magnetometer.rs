@@ -38,6 +38,9 @@ fn simulated() -> Simulated {
     scenario.simulate(SEED, 0).unwrap()
 }
 
+/// A change of a file, with words of the message about it.
+type Edit = (fn(&mut MagRecord), &'static str);
+
 fn values(of: &Magnetometer) -> Vec<(f64, Vector3<f64>)> {
     of.values().collect()
 }
@@ -156,7 +159,7 @@ fn calibration_json_corrects_the_output_to_the_field_and_older_readers_find_what
     }
     assert_eq!(mag.parameters.len(), mag.covariance.len());
     // What was edited in one place contradicts another.
-    let edits: [(fn(&mut MagRecord), &str); 4] = [
+    let edits: [Edit; 4] = [
         (
             |mag| mag.matrix[0][1] *= 2.0,
             "mag.correction · mag.matrix = 1",
