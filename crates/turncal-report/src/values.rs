@@ -57,13 +57,11 @@ pub fn magnetometer(calibration: &Calibration) -> Option<Table> {
         let values = values.map(|value| value.unwrap_or_else(|| NONE.to_owned()));
         std::iter::once(format!("mag    {axis}")).chain(values)
     });
-    let columns = ["", "to x", "to y", "to z", "hard iron"];
+    let unit = &mag.unit;
+    let first = format!("to x, {unit} per {per}");
+    let columns = ["", &first, "to y", "to z", &format!("hard iron, {unit}")];
     let rows = rows.map(|row| row.collect::<Vec<_>>());
-    let table = Table::new("", columns).section(rows);
-    Some(table.note(format!(
-        "In parentheses: 1σ in units of the last digit. Matrix: {} per {per}; hard iron: {}.",
-        mag.unit, mag.unit
-    )))
+    Some(Table::new("", columns).section(rows))
 }
 
 fn unit(calibration: &Calibration, sensor: Sensor) -> Option<&str> {
