@@ -62,6 +62,17 @@ pub struct MagneticMean {
     pub sigma: Vector3<f64>,
 }
 
+impl MagneticMean {
+    /// Centre of some outputs and their RMS distance from it, T; `None` if they are one point or beyond all numbers.
+    pub fn scatter(of: impl Iterator<Item = Self> + Clone) -> Option<(Vector3<f64>, f64)> {
+        let count = of.clone().count() as f64;
+        let centre = of.clone().map(|of| of.output).sum::<Vector3<f64>>() / count;
+        let squares = of.map(|of| (of.output - centre).norm_squared());
+        let size = (squares.sum::<f64>() / count).sqrt();
+        size.is_normal().then_some((centre, size))
+    }
+}
+
 impl Magnetometer {
     /// A magnetometer without values.
     pub fn new(unit: &str, nominal: f64) -> Self {

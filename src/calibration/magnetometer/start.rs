@@ -59,15 +59,7 @@ impl Fit {
             })
             .collect();
         let last = seen.last()?.stretch;
-        let count = seen.len() as f64;
-        let middle = seen.iter().map(|of| of.mean.output).sum::<Vector3<f64>>() / count;
-        let squares = seen
-            .iter()
-            .map(|of| (of.mean.output - middle).norm_squared());
-        let size = (squares.sum::<f64>() / count).sqrt();
-        if size == 0.0 {
-            return None;
-        }
+        let (middle, size) = MagneticMean::scatter(seen.iter().map(|of| *of.mean))?;
         let rows = |of: &Seen| of.rows((&middle, size), last + 1);
         let rows: Vec<DMatrix<f64>> = seen.iter().map(rows).collect();
         let solution = homogeneous(&rows)?;

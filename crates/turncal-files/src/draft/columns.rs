@@ -115,6 +115,7 @@ impl Columns {
             let is_taken = |of: [usize; 3]| stated.clone().any(|k| of.contains(k));
             let found = self.triads.get_mut(sensor);
             *found = found.filter(|of| !is_taken(*of));
+            self.magnetometer.take_if(|of| is_taken(of.columns));
             if let Some(triad) = of_triads.get(sensor) {
                 *self.triads.get_mut(sensor) = Some(*triad);
                 self.others.get_mut(sensor).clear();

@@ -3,8 +3,8 @@
 //! PX4 and ArduPilot compute `(n − offset) ⊙ scale` for accelerometers and `n − offset` for gyros, in sensor axes, and
 //! then rotate to body axes (`SENS_BOARD_ROT`, `AHRS_ORIENTATION`). INAV and Betaflight do the same in whole counts.
 //!
-//! Magnetometers: PX4 and ArduPilot multiply by a symmetric matrix, and ArduPilot adds its offsets; INAV computes
-//! `(counts − magzero) 1024 / maggain`; Betaflight only subtracts `mag_calibration`.
+//! Magnetometers: PX4 multiplies by a symmetric matrix and then turns to body axes, ArduPilot does the reverse and adds its
+//! offsets; INAV computes `(counts − magzero) 1024 / maggain`; Betaflight only subtracts `mag_calibration`.
 //!
 //! Source: PX4-Autopilot, `src/lib/sensor_calibration` and `src/modules/temperature_compensation`; ArduPilot,
 //! `AP_InertialSensor_Backend.cpp`, `_rotate_and_correct_accel`, and `AP_InertialSensor_tempcal.cpp`, `correct_sensor`;
@@ -34,9 +34,19 @@ const COUNTS_PER_RAD_S: f64 = 16.4 / DEGREE;
 /// Unit gain in INAV.
 const INAV_ONE: f64 = 4096.0;
 
-/// Quantity of the magnetometers per tesla.
-const GAUSS: f64 = 1e4;
-const MILLIGAUSS: f64 = 1e7;
+/// What the programs correct of a magnetometer: PX4 gauss, ArduPilot milligauss, Betaflight and INAV counts.
+const PX4: Reads = Reads {
+    per_tesla: Some(1e4),
+    of_chip: true,
+};
+const ARDUPILOT: Reads = Reads {
+    per_tesla: Some(1e7),
+    of_chip: false,
+};
+const COUNTS: Reads = Reads {
+    per_tesla: None,
+    of_chip: true,
+};
 /// Unit gain of a magnetometer in INAV.
 const INAV_COMPASS: f64 = 1024.0;
 
@@ -100,7 +110,7 @@ pub fn px4(values: &Values) -> Exported {
     let names = ["CAL_GYRO0_#OFF", "CAL_ACC0_#OFF", "CAL_ACC0_#SCALE"];
     let mut text = px4_lines(parameters(&program, names));
     let names = ["CAL_MAG0_#OFF", "CAL_MAG0_#SCALE", "CAL_MAG0_#ODIAG"];
-    let (compass, of_compass) = of_compass(values, (Reads::Field(GAUSS), 1.0), names);
+    let (compass, of_compass) = of_compass(values, (PX4, 1.0), names);
     let id = "CAL_MAG0_ID: set it to the device_id that `listener sensor_mag` shows";
     let of_id = (!compass.is_empty()).then(|| id.to_owned());
     text += &px4_lines(compass);
@@ -154,7 +164,7 @@ pub fn ardupilot(values: &Values) -> Exported {
     let names = ["INS_GYROFFS_#", "INS_ACCOFFS_#", "INS_ACCSCAL_#"];
     let mut text = lines(parameters(&program, names));
     let names = ["COMPASS_OFS_#", "COMPASS_DIA_#", "COMPASS_ODI_#"];
-    let (compass, of_compass) = of_compass(values, (Reads::Field(MILLIGAUSS), -1.0), names);
+    let (compass, of_compass) = of_compass(values, (ARDUPILOT, -1.0), names);
     text += &lines(compass);
     if let Some(thermal) = &values.record.temperature {
         let range = thermal.range.gyro;
@@ -228,7 +238,7 @@ pub fn betaflight(values: &Values) -> Exported {
 
 /// The magnetometer of a program that reads counts; or the reason why there is none.
 fn counted_compass(values: &Values) -> (Option<Compass>, Option<String>) {
-    match compass(values, Reads::Counts) {
+    match compass(values, COUNTS) {
         None => (None, None),
         Some(Err(why)) => (None, Some(format!("magnetometer: {why}"))),
         Some(Ok(found)) => (Some(found), None),

@@ -1,5 +1,5 @@
-//! A magnetometer as autopilots apply it: `matrix (n − offset)` with a symmetric matrix, along the axes of the vehicle to
-//! which the driver turns the output.
+//! A magnetometer as autopilots apply it: `matrix (n − offset)` with a symmetric matrix, along the axes of the chip or of
+//! the vehicle. Between the two, the driver turns by right angles.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -7,24 +7,21 @@ use super::values::Values;
 use crate::quantity::units_of_field;
 use turncal::units::DEGREE;
 
-/// Smallest cosine between an axis of the magnetometer and the nearest axis of the vehicle.
-const ALONG: f64 = 0.8;
-
 /// Offset and matrix in the quantity that a program reads.
 pub struct Compass {
     pub matrix: Matrix3<f64>,
     pub offset: Vector3<f64>,
-    /// Output along the axes of the vehicle per field.
+    /// Output per field, along the same axes.
     sensitivity: Matrix3<f64>,
 }
 
-/// What a program reads.
+/// What a program corrects.
 #[derive(Debug, Clone, Copy)]
-pub enum Reads {
-    /// A quantity, by its number per tesla.
-    Field(f64),
-    /// Counts, whose scale the program does not use.
-    Counts,
+pub struct Reads {
+    /// Its quantity per tesla; `None` for counts, whose scale it does not use.
+    pub per_tesla: Option<f64>,
+    /// Whether it corrects the output along the axes of the chip, before it turns them to those of the vehicle.
+    pub of_chip: bool,
 }
 
 /// The magnetometer of a calibration; the reason if the program cannot apply it, and `None` if there is none.
@@ -32,17 +29,16 @@ pub fn compass(values: &Values, reads: Reads) -> Option<Result<Compass, String>>
     let mag = values.record.mag.as_ref()?;
     let is_count = mag.unit == "count";
     let per_tesla = units_of_field().find(|(name, _)| *name == mag.unit)?.1;
-    let ratio = match reads {
-        Reads::Field(_) if is_count => {
-            let why = "the log contains counts, and the program reads a field; set mag_unit to the unit of the driver";
+    let ratio = match reads.per_tesla {
+        Some(_) if is_count => {
+            let why = "the log contains counts, but the program reads a field; set mag_unit to the unit of the driver";
             return Some(Err(why.to_owned()));
         }
-        Reads::Counts if !is_count => {
+        None if !is_count => {
             let why = "the program reads counts; calibrate a log of the raw counts";
             return Some(Err(why.to_owned()));
         }
-        Reads::Field(of_program) => of_program / per_tesla,
-        Reads::Counts => 1.0,
+        of_program => of_program.map_or(1.0, |of_program| of_program / per_tesla),
     };
     let of_file = Matrix3::from_fn(|i, j| mag.matrix[i][j]);
     let mut sensitivity = of_file * values.order.matrix() / per_tesla;
@@ -50,18 +46,17 @@ pub fn compass(values: &Values, reads: Reads) -> Option<Result<Compass, String>>
         sensitivity /= sensitivity.determinant().abs().cbrt();
     }
     let svd = sensitivity.svd(true, true);
-    let Some(axes) = nearest(&(svd.u? * svd.v_t?)) else {
-        let why = "no axis of the magnetometer is along an axis of the gyros, and the parameters contain no rotation";
+    let axes = (svd.u? * svd.v_t?).map(f64::round);
+    if !(axes.transpose() * axes).is_identity(0.0) {
+        let why = "its axes are not near those of the gyros, and the parameters cannot describe a rotation";
         return Some(Err(why.to_owned()));
-    };
+    }
     let to_vehicle = axes.transpose();
-    let (sensitivity, offset) = match reads {
-        Reads::Field(_) => (
-            to_vehicle * sensitivity,
-            to_vehicle * Vector3::from(mag.bias) * ratio,
-        ),
-        // These programs correct the axes of the chip, and then turn them.
-        Reads::Counts => (sensitivity * to_vehicle, mag.bias.into()),
+    let bias = Vector3::from(mag.bias) * ratio;
+    let (sensitivity, offset) = if reads.of_chip {
+        (sensitivity * to_vehicle, bias)
+    } else {
+        (to_vehicle * sensitivity, to_vehicle * bias)
     };
     let inverse = sensitivity.try_inverse()?;
     Some(Ok(Compass {
@@ -69,13 +64,6 @@ pub fn compass(values: &Values, reads: Reads) -> Option<Result<Compass, String>>
         offset,
         sensitivity,
     }))
-}
-
-/// The order and signs of the axes that are nearest to a rotation or reflection.
-fn nearest(axes: &Matrix3<f64>) -> Option<Matrix3<f64>> {
-    let rounded = axes.map(f64::round);
-    let is_order = axes.component_mul(&rounded).column_sum().min() > ALONG;
-    (is_order && (rounded.transpose() * rounded).is_identity(0.1)).then_some(rounded)
 }
 
 impl Compass {

@@ -118,14 +118,15 @@ impl Samples<'_> {
                 text.push(b',');
             }
             text.pop();
-            let mut here = None;
-            while let Some((_, value)) = field.next_if(|of| of.0 <= k) {
-                here = Some(value);
+            while field.next_if(|of| of.0 < k).is_some() {}
+            let (mut sum, mut count) = (Vector3::zeros(), 0.0);
+            while let Some((_, value)) = field.next_if(|of| of.0 == k) {
+                (sum, count) = (sum + value, count + 1.0);
             }
             for axis in (0..3).filter(|_| self.magnetometer.is_some()) {
                 text.push(b',');
-                if let Some(value) = here {
-                    text.extend_from_slice(number.format(value[axis]).as_bytes());
+                if count > 0.0 {
+                    text.extend_from_slice(number.format(sum[axis] / count).as_bytes());
                 }
             }
             if correction.changes() {

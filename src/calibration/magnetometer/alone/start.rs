@@ -4,6 +4,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector2, Vector3};
 
 use super::at_rest::AtRest;
 use crate::magnetic::MagneticTriad;
+use crate::recording::MagneticMean;
 
 /// Smallest singular value of the equations, relative to the largest.
 const DETERMINED: f64 = 1e-4;
@@ -11,15 +12,7 @@ const DETERMINED: f64 = 1e-4;
 /// The ellipsoid `|L⁻¹(N − D)| = 1` through the outputs by linear least squares, with L lower triangular; with gravity,
 /// turned into the body axes. `None` if the outputs do not determine it.
 pub fn ellipsoid(rests: &[AtRest], with_gravity: bool) -> Option<MagneticTriad> {
-    let count = rests.len() as f64;
-    let middle = rests.iter().map(|of| of.mean.output).sum::<Vector3<f64>>() / count;
-    let squares = rests
-        .iter()
-        .map(|of| (of.mean.output - middle).norm_squared());
-    let size = (squares.sum::<f64>() / count).sqrt();
-    if size.is_nan() || size <= 0.0 {
-        return None;
-    }
+    let (middle, size) = MagneticMean::scatter(rests.iter().map(|of| of.mean))?;
     let values: Vec<Vector3<f64>> = rests
         .iter()
         .map(|of| (of.mean.output - middle) / size)

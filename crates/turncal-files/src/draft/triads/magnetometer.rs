@@ -53,6 +53,7 @@ impl MagnetometerColumns {
         let (word, _) = units_of_field().min_by(|one, other| off(one).total_cmp(&off(other)))?;
         Some(Self {
             columns,
+            // Both have one size; a file of milligauss would say so.
             unit: if word == "mG" { "count" } else { word },
             is_stated: false,
         })
