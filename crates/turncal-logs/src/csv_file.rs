@@ -1,11 +1,18 @@
 //! Rows of numbers below a line of names, plain or gzipped, read row by row without storing the text.
 
 mod clock_text;
+mod delimiter;
 mod heading;
 mod kind;
+mod labels;
 mod lines;
+mod look;
+mod marks;
+mod names;
+mod preamble;
 mod row;
 mod shape;
+mod tags;
 
 use std::borrow::Cow;
 use std::fmt::Display;
@@ -16,7 +23,8 @@ use flate2::read::MultiGzDecoder;
 
 use super::data_file::DataFile;
 use super::rows::Rows;
-use heading::{Heading, Looks, other_number};
+use delimiter::other_number;
+use heading::{Heading, Looks};
 pub use kind::{RowKind, is_remark};
 use lines::{LONGEST, Line, Lines, Stop};
 use row::{LONGEST_FIELD, MOST_COLUMNS, Malformed, Row};

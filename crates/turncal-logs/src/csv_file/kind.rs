@@ -1,6 +1,6 @@
 //! The layout of the rows of a text file, used to distinguish rows from other lines as they arrive.
 
-use super::heading::Delimiter;
+use super::delimiter::Delimiter;
 use super::lines::{comment, has_content};
 use super::row::Row;
 use turncal_input::excerpt;

@@ -4,216 +4,16 @@
 //! rare shape is a remark, a damaged row or the start-up text of a device.
 
 use std::collections::HashMap;
-use std::ops::Range;
 
+use super::labels::{Label, labels, named};
 use super::lines::{Line, comment};
+use super::marks::{Marked, has_mark, number};
 
-/// Stands for a number or time.
-const MARK: u8 = 1;
-/// Stands for a word of digits and letters, such as a status in hexadecimal digits.
-const WORD: u8 = 2;
 /// Minimum number of lines of a stream, and their minimum fraction of all lines; fewer lines count as rare.
 const FEWEST: usize = 5;
 pub const RARE: usize = 50;
 /// Separates the values of a sample once words are removed.
 pub const SEPARATOR: u8 = b'\t';
-/// Longest name of a value.
-const LONGEST_NAME: usize = 32;
-
-/// A line, with the positions of its numbers, times and words of digits and letters.
-struct Marked<'a> {
-    text: &'a [u8],
-    marks: Vec<Range<usize>>,
-    shape: Vec<u8>,
-}
-
-impl<'a> Marked<'a> {
-    fn of(text: &'a [u8], comma: bool) -> Self {
-        let whole = text.trim_ascii();
-        let text = without_check_sum(whole);
-        let (mut marks, mut shape, mut at) = (Vec::new(), Vec::new(), 0);
-        let mut is_in_word = false;
-        while at < text.len() {
-            let rest = &text[at..];
-            let found = if is_in_word {
-                None
-            } else {
-                time(rest)
-                    .or_else(|| number(rest, comma))
-                    .map(|length| (length, MARK))
-            };
-            if let Some((length, mark)) = found.or_else(|| mixed(rest, is_in_word)) {
-                marks.push(at..at + length);
-                shape.push(mark);
-                at += length;
-                is_in_word = true;
-                continue;
-            }
-            let byte = text[at];
-            is_in_word = byte.is_ascii_alphanumeric() || byte == b'_' || byte >= 0x80;
-            if byte.is_ascii_whitespace() {
-                let blanks = rest.iter().take_while(|of| of.is_ascii_whitespace());
-                let has_tab = blanks.clone().any(|of| *of == b'\t');
-                shape.push(if has_tab { b'\t' } else { b' ' });
-                at += blanks.count();
-            } else {
-                shape.push(byte);
-                at += 1;
-            }
-        }
-        if text.len() < whole.len() {
-            shape.push(b'*');
-        }
-        Self { text, marks, shape }
-    }
-
-    fn values(&self) -> impl Iterator<Item = &'a [u8]> {
-        self.marks.iter().map(|mark| &self.text[mark.clone()])
-    }
-}
-
-/// The text without `*` and hexadecimal digits at its end.
-fn without_check_sum(text: &[u8]) -> &[u8] {
-    let end = text.iter().rposition(|byte| *byte == b'*');
-    let sum = end.map(|end| (end, &text[end + 1..]));
-    match sum {
-        Some((end, sum))
-            if (2..=8).contains(&sum.len()) && sum.iter().all(u8::is_ascii_hexdigit) =>
-        {
-            &text[..end]
-        }
-        _ => text,
-    }
-}
-
-fn digits(text: &[u8]) -> usize {
-    text.iter().take_while(|byte| byte.is_ascii_digit()).count()
-}
-
-/// Length of a number at the beginning of a string. Letters after it end its field; otherwise, it is not a number.
-fn number(text: &[u8], comma: bool) -> Option<usize> {
-    let mut at = usize::from(matches!(text.first(), Some(b'+' | b'-')));
-    if let [a, b, c, rest @ ..] = &text[at..]
-        && [a, b, c].map(u8::to_ascii_lowercase) == *b"nan"
-        && !rest.first().is_some_and(u8::is_ascii_alphanumeric)
-    {
-        return Some(at + 3);
-    }
-    let whole = digits(&text[at..]);
-    at += whole;
-    let point = text
-        .get(at)
-        .filter(|byte| **byte == b'.' || comma && **byte == b',');
-    let fraction = point.map_or(0, |_| digits(&text[at + 1..]));
-    if whole + fraction == 0 {
-        return None;
-    }
-    at += if fraction > 0 || point == Some(&b'.') {
-        1 + fraction
-    } else {
-        0
-    };
-    if let Some(b'e' | b'E' | b'd' | b'D') = text.get(at) {
-        let sign = usize::from(matches!(text.get(at + 1), Some(b'+' | b'-')));
-        let exponent = digits(&text[at + 1 + sign..]);
-        at += if exponent > 0 { 1 + sign + exponent } else { 0 };
-    }
-    let letters = text[at..]
-        .iter()
-        .take_while(|byte| byte.is_ascii_alphabetic())
-        .count();
-    let behind = text.get(at + letters);
-    let ends =
-        behind.is_none_or(|byte| !byte.is_ascii_alphanumeric() && !matches!(byte, b'_' | b'.'));
-    ends.then_some(at)
-}
-
-/// Length of a date, a time of day or both at the beginning of a string.
-fn time(text: &[u8]) -> Option<usize> {
-    let mut at = date(text);
-    if at > 0 && matches!(text.get(at), Some(b' ' | b'T' | b'_')) && clock(&text[at + 1..]) > 0 {
-        at += 1;
-    }
-    let clock = clock(&text[at..]);
-    if clock == 0 {
-        return (at > 0).then_some(at);
-    }
-    at += clock;
-    let half = text.get(at + 1..at + 3).map(<[u8]>::to_ascii_lowercase);
-    if text.get(at) == Some(&b' ') && half.is_some_and(|half| half == b"am" || half == b"pm") {
-        at += 3;
-    }
-    Some(at)
-}
-
-/// Length of a date such as `2021-03-04`, `20210304T` or `07/01/2021`; zero if there is none.
-fn date(text: &[u8]) -> usize {
-    let first = digits(text);
-    if first == 8 && text.get(8) == Some(&b'T') {
-        return 8;
-    }
-    let Some(&sign @ (b'-' | b'/' | b'.')) = text.get(first) else {
-        return 0;
-    };
-    let rest = &text[first + 1..];
-    let second = match rest
-        .iter()
-        .take_while(|byte| byte.is_ascii_alphabetic())
-        .count()
-    {
-        0 => digits(rest),
-        letters => letters,
-    };
-    let third = rest.get(second + 1..).map_or(0, digits);
-    let lengths = (first, second, third);
-    let is_date = matches!(lengths, (4, 1..=3, 1..=2) | (1..=2, 1..=3, 4));
-    let ends = !rest
-        .get(second + 1 + third)
-        .is_some_and(|byte| byte.is_ascii_digit() || *byte == b'.');
-    if is_date && rest.get(second) == Some(&sign) && ends {
-        first + 1 + second + 1 + third
-    } else {
-        0
-    }
-}
-
-/// Length of a time of day with its zone; zero if there is none.
-fn clock(text: &[u8]) -> usize {
-    let mut at = digits(text);
-    if !(1..=2).contains(&at) {
-        return 0;
-    }
-    let mut parts = 1;
-    while parts < 3 && text.get(at) == Some(&b':') && digits(&text[at + 1..]) == 2 {
-        (at, parts) = (at + 3, parts + 1);
-    }
-    if parts == 1 || text.get(at).is_some_and(u8::is_ascii_digit) {
-        return 0;
-    }
-    if parts == 3 && matches!(text.get(at), Some(b'.' | b',' | b':')) {
-        let fraction = digits(&text[at + 1..]);
-        at += if fraction > 0 { 1 + fraction } else { 0 };
-    }
-    match text.get(at) {
-        Some(b'Z') => at + 1,
-        Some(b'+' | b'-') if text.get(at + 3) == Some(&b':') => at + 6.min(text.len() - at),
-        _ => at,
-    }
-}
-
-/// Length of a word that mixes digits and letters, like a hexadecimal number.
-fn mixed(text: &[u8], is_in_word: bool) -> Option<(usize, u8)> {
-    let word = |with: &[u8]| {
-        let is_part = |byte: &&u8| byte.is_ascii_alphanumeric() || with.contains(byte);
-        &text[..text.iter().take_while(is_part).count()]
-    };
-    let with_points = word(b".");
-    let has_points = with_points.iter().filter(|byte| **byte == b'.').count() > 1;
-    let word = if has_points { with_points } else { word(b"") };
-    let is_mixed = has_points || word.iter().any(u8::is_ascii_alphabetic);
-    let is_word = word.first().is_some_and(u8::is_ascii_digit) && is_mixed;
-    (!is_in_word && is_word).then_some((word.len(), WORD))
-}
 
 /// The last line that named the deeper lines below it, as in YAML.
 #[derive(Debug, Default)]
@@ -249,6 +49,23 @@ pub struct Stream {
     pub names: Vec<String>,
     /// Units of the values in a sample; empty if not stated.
     pub units: Vec<String>,
+}
+
+impl Stream {
+    fn new(kinds: Vec<&Kind>) -> Self {
+        let labels: Vec<Label> = kinds.iter().flat_map(|kind| kind.labels()).collect();
+        let first = labels.iter().find(|label| !label.words.is_empty());
+        let name = first
+            .and_then(|label| label.words.split(' ').next())
+            .unwrap_or_default();
+        let (names, units) = named(&labels).into_iter().unzip();
+        Self {
+            name: name.to_owned(),
+            shapes: kinds.iter().map(|kind| kind.shape.clone()).collect(),
+            names,
+            units,
+        }
+    }
 }
 
 /// The streams of a text file with rows that contain words next to their numbers.
@@ -413,6 +230,16 @@ impl Kind {
     fn has_time(&self) -> bool {
         self.increases.contains(&true)
     }
+
+    /// The label of each value.
+    fn labels(&self) -> Vec<Label> {
+        let increases = self.increases.iter().zip(labels(&self.shape));
+        let with = increases.map(|(increases, label)| Label {
+            increases: *increases,
+            ..label
+        });
+        with.collect()
+    }
 }
 
 /// A sample that is read line by line.
@@ -524,10 +351,6 @@ fn is_labelled(shape: &[u8]) -> bool {
         || is_enclosed
 }
 
-fn has_mark(field: &[u8]) -> bool {
-    field.iter().any(|byte| matches!(*byte, MARK | WORD))
-}
-
 /// The separator of most numbers; `None` for blanks.
 fn separator(shape: &[u8]) -> Option<u8> {
     let parted = |by: &u8| {
@@ -585,180 +408,4 @@ fn cycle(order: &[usize]) -> Option<Vec<usize>> {
         period.rotate_left(begin);
         period
     })
-}
-
-/// Label of a value.
-#[derive(Default)]
-struct Label {
-    /// Words before it, without signs at their ends.
-    words: String,
-    unit: String,
-    /// Axis at the end of the words.
-    axis: Option<char>,
-    /// Whether the value only increases, as time stamps do.
-    increases: bool,
-}
-
-impl Stream {
-    fn new(kinds: Vec<&Kind>) -> Self {
-        let labels: Vec<Label> = kinds.iter().flat_map(|kind| kind.labels()).collect();
-        let first = labels.iter().find(|label| !label.words.is_empty());
-        let name = first
-            .and_then(|label| label.words.split(' ').next())
-            .unwrap_or_default();
-        let (names, units) = named(&labels).into_iter().unzip();
-        Self {
-            name: name.to_owned(),
-            shapes: kinds.iter().map(|kind| kind.shape.clone()).collect(),
-            names,
-            units,
-        }
-    }
-}
-
-impl Kind {
-    /// The label of each value.
-    fn labels(&self) -> Vec<Label> {
-        let increases = self.increases.iter().zip(labels(&self.shape));
-        let with = increases.map(|(increases, label)| Label {
-            increases: *increases,
-            ..label
-        });
-        with.collect()
-    }
-}
-
-/// The label of each value of a line.
-fn labels(shape: &[u8]) -> Vec<Label> {
-    let text = String::from_utf8_lossy(shape);
-    let pieces: Vec<&str> = text.split([char::from(MARK), char::from(WORD)]).collect();
-    let is_separator = |c: char| matches!(c, ',' | ';' | '|' | '\t');
-    let mut labels: Vec<Label> = Vec::new();
-    for (k, piece) in pieces.iter().enumerate() {
-        let is_last = k + 1 == pieces.len();
-        let glued = piece
-            .find(|c: char| !c.is_alphabetic() && c != '°')
-            .unwrap_or(piece.len());
-        // Words up to a separator belong to the preceding value; so do letters without a blank.
-        let end = match piece.find(is_separator) {
-            Some(end) => end,
-            None if is_last => piece.len(),
-            None => glued,
-        };
-        let (unit, words) = piece.split_at(if k == 0 { 0 } else { end });
-        if let Some(before) = labels.last_mut()
-            && before.unit.is_empty()
-        {
-            unit.trim().clone_into(&mut before.unit);
-        }
-        if !is_last {
-            labels.push(Label::of(words));
-        }
-    }
-    labels
-}
-
-impl Label {
-    fn of(words: &str) -> Self {
-        let mut words = words.to_owned();
-        let mut unit = String::new();
-        for [open, close] in [['[', ']'], ['(', ')']] {
-            if let Some((before, rest)) = words.split_once(open)
-                && let Some((inner, behind)) = rest.split_once(close)
-                && inner.chars().any(char::is_alphabetic)
-            {
-                inner.trim().clone_into(&mut unit);
-                words = format!("{before} {behind}");
-            }
-        }
-        let is_part = |c: char| c.is_alphanumeric() || c == '_';
-        let tokens: Vec<&str> = words
-            .split(|c: char| !is_part(c))
-            .filter(|of| !of.is_empty())
-            .collect();
-        let axis = tokens.last().and_then(|last| axis(last));
-        let mut words = tokens.join(" ");
-        if let Some((cut, _)) = words.char_indices().rev().nth(LONGEST_NAME - 1) {
-            words.drain(..cut);
-        }
-        Self {
-            words,
-            unit,
-            axis,
-            increases: false,
-        }
-    }
-}
-
-/// The axis denoted by a word.
-fn axis(word: &str) -> Option<char> {
-    let mut letters = word.chars();
-    letters
-        .next()
-        .filter(|letter| "xyzXYZ".contains(*letter) && letters.next().is_none())
-}
-
-/// Names and units of values. An axis alone belongs to the words before the last one; words before three values name
-/// their axes, after a time or not.
-fn named(labels: &[Label]) -> Vec<(String, String)> {
-    let mut named = Vec::new();
-    let mut group = Label::default();
-    let mut rest = labels;
-    while let Some((label, behind)) = rest.split_first() {
-        let run = 1 + (behind.iter().take_while(|of| of.words.is_empty())).count();
-        let (values, others) = rest.split_at(run);
-        rest = others;
-        let is_axis = label.axis.is_some() && label.words.len() == 1;
-        if let Some(axis) = label.axis.filter(|_| !is_axis) {
-            let words = label.words.trim_end_matches(axis).trim().to_owned();
-            let unit = label.unit.clone();
-            group = Label {
-                words,
-                unit,
-                ..Label::default()
-            };
-        }
-        let times = usize::from(label.increases && run > 1);
-        named.extend(match run - times {
-            1 if times == 0 && is_axis && !group.words.is_empty() => {
-                vec![label.called(format!("{} {}", group.words, label.words), &group)]
-            }
-            3 if label.axis.is_none() && !label.words.is_empty() => {
-                let axes = values[times..].iter().zip(['x', 'y', 'z']);
-                let axes =
-                    axes.map(|(of, axis)| of.called(format!("{} {axis}", label.words), label));
-                let time = values[..times]
-                    .iter()
-                    .map(|of| of.called(String::new(), of));
-                time.chain(axes).collect()
-            }
-            _ if run == 1 => vec![label.called(label.words.clone(), label)],
-            // The words of a longer row name the row.
-            _ => values
-                .iter()
-                .map(|of| of.called(String::new(), of))
-                .collect(),
-        });
-    }
-    distinct(named)
-}
-
-impl Label {
-    /// The value with this name; if it has no unit, with the unit of another label.
-    fn called(&self, name: String, other: &Self) -> (String, String) {
-        let own = Some(&self.unit).filter(|unit| !unit.is_empty());
-        (name, own.unwrap_or(&other.unit).clone())
-    }
-}
-
-/// Names made unique.
-fn distinct(mut named: Vec<(String, String)>) -> Vec<(String, String)> {
-    let all = named.clone();
-    for (k, (name, _)) in named.iter_mut().enumerate() {
-        let mut others = all.iter().enumerate().filter(|(other, _)| *other != k);
-        if !name.is_empty() && others.any(|(_, of)| of.0 == *name) {
-            *name = format!("{name} {}", k + 1);
-        }
-    }
-    named
 }
