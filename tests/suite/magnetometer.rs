@@ -312,11 +312,14 @@ fn counts_and_whole_matrices_go_where_a_program_takes_them() {
             "{found}"
         );
     }
-    let betaflight = text_of(&record, "betaflight", None).0;
-    assert!(
-        betaflight.contains("set mag_calibration = 140,-260,35\n"),
-        "{betaflight}"
-    );
+    // Betaflight turns the output to the axes of the vehicle before it subtracts.
+    let turned = matrix([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]);
+    let of_turned = with_magnetometer(turned * sensitivity * matrix(FROM_FRD), bias, "count");
+    for (record, zero) in [(&record, "140,-260,35"), (&of_turned, "260,140,35")] {
+        let betaflight = text_of(record, "betaflight", None).0;
+        let line = format!("set mag_calibration = {zero}\n");
+        assert!(betaflight.contains(&line), "{betaflight}");
+    }
     let notes = text_of(&record, "px4", None).1;
     assert!(
         notes.iter().any(|note| note.contains("counts")),

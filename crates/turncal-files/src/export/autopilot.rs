@@ -4,7 +4,8 @@
 //! then rotate to body axes (`SENS_BOARD_ROT`, `AHRS_ORIENTATION`). INAV and Betaflight do the same in whole counts.
 //!
 //! Magnetometers: PX4 multiplies by a symmetric matrix and then turns to body axes, ArduPilot does the reverse and adds its
-//! offsets; INAV computes `(counts − magzero) 1024 / maggain`; Betaflight only subtracts `mag_calibration`.
+//! offsets; INAV computes `(counts − magzero) 1024 / maggain` before it turns; Betaflight turns and only subtracts
+//! `mag_calibration`.
 //!
 //! Source: PX4-Autopilot, `src/lib/sensor_calibration` and `src/modules/temperature_compensation`; ArduPilot,
 //! `AP_InertialSensor_Backend.cpp`, `_rotate_and_correct_accel`, and `AP_InertialSensor_tempcal.cpp`, `correct_sensor`;
@@ -43,9 +44,13 @@ const ARDUPILOT: Reads = Reads {
     per_tesla: Some(1e7),
     of_chip: false,
 };
-const COUNTS: Reads = Reads {
+const INAV: Reads = Reads {
     per_tesla: None,
     of_chip: true,
+};
+const BETAFLIGHT: Reads = Reads {
+    per_tesla: None,
+    of_chip: false,
 };
 /// Unit gain of a magnetometer in INAV.
 const INAV_COMPASS: f64 = 1024.0;
@@ -222,7 +227,7 @@ pub fn betaflight(values: &Values) -> Exported {
         let [x, y, z] = [zero.x, zero.y, zero.z].map(|count| count as i64);
         format!("set {key} = {x},{y},{z}{end}\n")
     };
-    let (compass, of_compass) = counted_compass(values);
+    let (compass, of_compass) = counted_compass(values, BETAFLIGHT);
     let compass = compass.map(|of| (of.offset.map(f64::round), of.residual(&Matrix3::identity())));
     let (compass, residual) = compass.unzip();
     let compass = compass.map(|zero| line("mag_calibration", zero, ""));
@@ -237,8 +242,8 @@ pub fn betaflight(values: &Values) -> Exported {
 }
 
 /// The magnetometer of a program that reads counts; or the reason why there is none.
-fn counted_compass(values: &Values) -> (Option<Compass>, Option<String>) {
-    match compass(values, COUNTS) {
+fn counted_compass(values: &Values, reads: Reads) -> (Option<Compass>, Option<String>) {
+    match compass(values, reads) {
         None => (None, None),
         Some(Err(why)) => (None, Some(format!("magnetometer: {why}"))),
         Some(Ok(found)) => (Some(found), None),
@@ -267,7 +272,7 @@ pub fn inav(values: &Values) -> Exported {
         ("gyro_zero", &gyro_zero),
     ];
     let mut text = all.map(|(name, values)| set(name, values)).concat();
-    let (compass, of_compass) = counted_compass(values);
+    let (compass, of_compass) = counted_compass(values, INAV);
     let compass = compass.map(|of| {
         let gain = of
             .matrix
@@ -281,7 +286,7 @@ pub fn inav(values: &Values) -> Exported {
     });
     let reads = (
         "#",
-        "commands for the Betaflight command line, computed from rad/s and m/s^2",
+        "commands for the INAV command line, computed from rad/s and m/s^2",
     );
     Remarks::of_program(values, reads, &program, &[UNCORRECTED])
         .omitting(of_compass.or(compass))
