@@ -50,7 +50,7 @@ use constants::{Candidate, Constant, Known, Posterior, Prior, of_parameters};
 pub use error::{CalibrationError, ComparisonError};
 pub use estimate::{Epoch, Estimate};
 pub use estimator::estimate;
-pub use leg::{Journey, Leg};
+pub use leg::{Journey, Leg, Terms};
 pub use linearisation::{AttitudePrior, Linearisation};
 pub use magnetometer::{MagneticEstimate, MagneticPrior, ellipsoid};
 pub use model::Model;

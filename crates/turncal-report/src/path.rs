@@ -71,7 +71,9 @@ impl Report<'_> {
         )];
         document.both(self.groups());
         if let Some(design) = self.design {
-            document.both(shipped::table(design));
+            for table in shipped::tables(design) {
+                document.both(table);
+            }
         }
         document.both(self.facts(&navigated));
         document.both(self.moves());

@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::expected::{along, expected};
-use super::goal::Goals;
+use super::expected::{ByTerms, along, expected};
+use super::goal::{Compared, Goals};
 use super::legs::Legs;
 use super::search::{SHORTEST_DWELL, Search};
 use super::turn::Turn;
@@ -13,6 +13,10 @@ use crate::study::path::PathError;
 
 /// Numbers of turns in the typical time among which the dwells of a first path are chosen.
 const TURNS: [f64; 3] = [14.0, 22.0, 32.0];
+/// Maximum number of passes of the exchange; each begins with σ of joined legs corrected for the path so far.
+const PASSES: usize = 4;
+/// Dwells of the second path from which σ of joined legs are corrected, divided by those of the first.
+const LONGER: f64 = 1.4;
 /// Number of corrections of the dwells; they are needed because the goals refer to the σ of joined legs.
 const CORRECTIONS: usize = 6;
 /// Smallest difference between dwells, s.
@@ -24,7 +28,7 @@ const DECIDED: f64 = 0.998;
 pub struct Candidate {
     pub turns: Vec<Turn>,
     pub dwell: f64,
-    estimate: Estimate,
+    pub expected: ByTerms<Estimate>,
 }
 
 impl DesignStudy {
@@ -49,31 +53,38 @@ impl DesignStudy {
             self.fitted(&search, goals, candidate)
         });
         let first: Vec<Candidate> = first.collect::<Result<_, _>>()?;
-        let by_cost = |a: &Candidate, b: &Candidate| {
+        let first = first.into_iter().min_by(|a, b| {
             let [a, b] = [a, b].map(|of| self.cost(&search, goals, of));
             a.total_cmp(&b)
-        };
-        let Some(first) = first.into_iter().min_by(by_cost) else {
+        });
+        let Some(mut best) = first else {
             return search.legs.candidate(Vec::new(), time);
         };
-        if let Some(joined) = search.legs.sigma(&first.turns, first.dwell) {
-            search.goals = goals.corrected(&joined, &first.estimate.sigma());
+        for _ in 0..PASSES {
+            let Some(compared) = search.legs.compared(&best)? else {
+                break;
+            };
+            search.goals = goals.corrected(&compared);
+            // With limits, the exchange improves the σ in the time that the path takes.
+            search.time = search.duration(&best.turns, best.dwell);
+            let turns = search.exchange(best.turns.clone())?;
+            let exchanged = search.legs.candidate(turns.clone(), search.dwell(&turns))?;
+            search.time = time;
+            let exchanged = self.fitted(&search, goals, exchanged)?;
+            let [cost, lowest] = [&exchanged, &best].map(|of| self.cost(&search, goals, of));
+            if cost >= lowest {
+                break;
+            }
+            best = exchanged;
         }
-        search.time = search.duration(&first.turns, first.dwell);
-        let turns = search.exchange(first.turns.clone())?;
-        let exchanged = search.legs.candidate(turns.clone(), search.dwell(&turns))?;
-        search.time = time;
-        let exchanged = self.fitted(&search, goals, exchanged)?;
-        Ok(std::cmp::min_by(exchanged, first, |a, b| {
-            let [a, b] = [a, b].map(|of| self.cost(&search, goals, of));
-            a.total_cmp(&b)
-        }))
+        Ok(best)
     }
 
     /// The figure to minimise: the time if limits are decided, the σ in all other cases.
     fn cost(&self, search: &Search, goals: &Goals, of: &Candidate) -> f64 {
-        let cost = goals.cost(&of.estimate.sigma());
-        let is_decided = goals.worst(&of.estimate.sigma()) <= DECIDED;
+        let sigma = of.expected.sigma();
+        let cost = goals.cost(&sigma, of.dwell);
+        let is_decided = goals.worst(&sigma, of.dwell) <= DECIDED;
         match self.specification {
             Some(_) if is_decided => search.duration(&of.turns, of.dwell) / search.time - 2.0,
             _ => cost,
@@ -93,7 +104,7 @@ impl DesignStudy {
         let longest = search.dwell(&candidate.turns);
         let mut decided: Option<Candidate> = None;
         for _ in 0..CORRECTIONS {
-            let worst = goals.worst(&candidate.estimate.sigma());
+            let worst = goals.worst(&candidate.expected.sigma(), candidate.dwell);
             // σ decrease with the root of the time, or more slowly.
             let dwell = candidate.dwell * (worst * worst * 1.01).clamp(0.3, 3.0);
             let dwell = dwell.clamp(SHORTEST_DWELL.min(longest), longest);
@@ -111,12 +122,25 @@ impl DesignStudy {
 
 impl Legs<'_> {
     /// A path with its exact σ.
-    fn candidate(&self, turns: Vec<Turn>, dwell: f64) -> Result<Candidate, PathError> {
+    pub fn candidate(&self, turns: Vec<Turn>, dwell: f64) -> Result<Candidate, PathError> {
         let path = self.machine.path(&self.machine.start(), &turns, dwell);
         Ok(Candidate {
-            estimate: expected(&along(&self.study, path)?)?,
+            expected: expected(&along(&self.study, path)?)?,
             turns,
             dwell,
         })
+    }
+
+    /// Joined and exact σ of a path, and of the same turns with longer dwells; `None` if the legs determine too little.
+    pub fn compared(&self, path: &Candidate) -> Result<Option<[Compared; 2]>, PathError> {
+        let longer = self.candidate(path.turns.clone(), LONGER * path.dwell)?;
+        let [near, far] = [path, &longer].map(|of| {
+            Some(Compared {
+                dwell: of.dwell,
+                joined: self.sigma(&of.turns, of.dwell)?,
+                exact: of.expected.sigma(),
+            })
+        });
+        Ok(near.zip(far).map(|(near, far)| [near, far]))
     }
 }

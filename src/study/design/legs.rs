@@ -4,9 +4,10 @@ use std::collections::{HashMap, HashSet};
 
 use rayon::prelude::*;
 
+use super::expected::Sigma;
 use super::machine::Machine;
 use super::turn::{Place, Turn};
-use crate::calibration::{AttitudePrior, Journey, Leg, ParameterVector, Problem, coarse_start};
+use crate::calibration::{AttitudePrior, Journey, Leg, Problem, coarse_start};
 use crate::imu::PerSensor;
 use crate::study::path::{PathError, PathStudy};
 
@@ -25,6 +26,20 @@ pub struct Legs<'a> {
     /// The first dwell.
     first: Vec<Leg>,
     made: HashMap<(Vec<i32>, Turn), Leg>,
+}
+
+/// A path up to the end of one of its dwells.
+#[derive(Debug, Clone)]
+pub struct Stage {
+    journey: Journey,
+    place: Place,
+}
+
+impl Stage {
+    /// Expected σ; `None` if a constant is undetermined.
+    pub fn sigma(&self) -> Option<Sigma> {
+        Sigma::after(&self.journey)
+    }
 }
 
 impl<'a> Legs<'a> {
@@ -85,25 +100,33 @@ impl<'a> Legs<'a> {
         Ok(())
     }
 
-    /// Expected σ of a path with dwells of this duration in s; its legs must already exist.
-    pub fn sigma(&self, turns: &[Turn], dwell: f64) -> Option<ParameterVector> {
+    /// A path of only the first dwell, with dwells of this duration in s.
+    pub fn begun(&self, dwell: f64) -> Option<Stage> {
         let mut journey = self.before.clone();
-        let mut place = self.machine.start();
-        let factor = MADE_WITH / dwell;
         for leg in &self.first {
-            journey.go(leg, factor).ok()?;
+            journey.go(leg, MADE_WITH / dwell).ok()?;
         }
-        for turn in turns {
-            let leg = self.made.get(&(place.key(), turn.clone()))?;
-            journey.go(leg, factor).ok()?;
-            place = self.machine.after(&place, turn);
-        }
-        journey.sigma()
+        Some(Stage {
+            journey,
+            place: self.machine.start(),
+        })
     }
 
-    /// Number of legs made.
-    pub fn count(&self) -> usize {
-        self.made.len()
+    /// A path continued by turns, with dwells of this duration in s; the legs must already exist.
+    pub fn continued(&self, stage: &Stage, turns: &[Turn], dwell: f64) -> Option<Stage> {
+        let mut stage = stage.clone();
+        for turn in turns {
+            let leg = self.made.get(&(stage.place.key(), turn.clone()))?;
+            stage.journey.go(leg, MADE_WITH / dwell).ok()?;
+            stage.place = self.machine.after(&stage.place, turn);
+        }
+        Some(stage)
+    }
+
+    /// Expected σ of a path with dwells of this duration in s; its legs must already exist.
+    pub fn sigma(&self, turns: &[Turn], dwell: f64) -> Option<Sigma> {
+        let begun = self.begun(dwell)?;
+        self.continued(&begun, turns, dwell)?.sigma()
     }
 }
 
@@ -138,8 +161,8 @@ mod tests {
                 let study = along(&setting, path).unwrap();
                 let mut legs = Legs::new(machine, &study).unwrap();
                 legs.make([&turns[..]].into_iter()).unwrap();
-                let joined = legs.sigma(&turns, dwell).unwrap();
-                let whole = expected(&study).unwrap();
+                let joined = legs.sigma(&turns, dwell).unwrap().none;
+                let whole = expected(&study).unwrap().none;
                 for group in Group::all() {
                     let [joined, own] = [&joined, &whole.sigma()].map(|of| group.rms(of, &whole));
                     let ratio = joined.unwrap() / own.unwrap();

@@ -13,9 +13,10 @@ use crate::units::DEGREE;
 /// Highest rate of a designed turn of a table, °/s: precise gyros need not measure more.
 const FASTEST: f64 = 100.0;
 /// Rates of full turns, divided by the highest: three, because two do not separate a nonlinearity from a scale factor.
+/// In the slowest turns, the errors that grow with the rate are small.
 const RATES: [f64; 3] = [1.0, 0.6, 0.3];
-/// Mean rates of full turns by hand without their start and end, °/s.
-const RATES_BY_HAND: [i32; 2] = [45, 75];
+/// Mean rates of turns by hand without their start and end, °/s.
+const RATES_BY_HAND: [i32; 3] = [45, 75, 15];
 /// Additional time for the start and end of a turn by hand, s.
 const START_AND_END: f64 = 1.0;
 /// Angular acceleration of a turn by hand, °/s².
@@ -110,20 +111,20 @@ impl Machine<'_> {
             };
             let rates = self.rates(axis);
             add(&BETWEEN, rates[0]);
+            add(&BETWEEN, rates[2]);
             rates.iter().for_each(|&rate| add(&FULL, rate));
         }
         turns
     }
 
     /// Rates of the turns about an axis, °/s; the first is that of turns between attitudes.
-    fn rates(&self, axis: usize) -> Vec<i32> {
+    fn rates(&self, axis: usize) -> [i32; 3] {
         match self {
             Self::Table(table) => {
                 let fastest = (table.axes[axis].max_rate / DEGREE).min(FASTEST);
-                let rates = RATES.map(|part| ((part * fastest) as i32).max(1));
-                rates.to_vec()
+                RATES.map(|part| ((part * fastest) as i32).max(1))
             }
-            Self::Hand => RATES_BY_HAND.to_vec(),
+            Self::Hand => RATES_BY_HAND,
         }
     }
 
@@ -164,7 +165,8 @@ impl Machine<'_> {
     pub fn tour(&self) -> Vec<Turn> {
         let turns = self.turns().into_iter();
         let quarters = turns.filter(|turn| turn.degrees.iter().sum::<i32>() == 90);
-        let once: Vec<Turn> = quarters.collect();
+        let mut once: Vec<Turn> = quarters.collect();
+        once.dedup_by_key(|turn| turn.degrees.clone());
         [&once[..], &once].concat()
     }
 

@@ -14,9 +14,13 @@ mod shipped;
 mod text;
 mod turn;
 
+#[cfg(test)]
+mod tests;
+
 use super::path::{Evaluation, PathError, PathStudy};
 use crate::calibration::Estimate;
 use crate::lot::Specification;
+pub use expected::{ByTerms, Sigma};
 use expected::{along, expected};
 use goal::Goals;
 use legs::Legs;
@@ -52,7 +56,7 @@ pub struct Design {
     /// Expected results.
     pub evaluation: Evaluation,
     /// Expected σ as those of the other paths.
-    pub estimate: Estimate,
+    pub expected: ByTerms<Estimate>,
     /// Other paths in the same time.
     pub shipped: Vec<Shipped>,
     /// The path file.
@@ -92,7 +96,7 @@ impl DesignStudy {
         Ok(Design {
             text: text::text(&machine, &best.turns, dwell, &self.comment(duration)),
             evaluation: study.evaluate()?,
-            estimate: expected(&study)?,
+            expected: expected(&study)?,
             shipped: Shipped::all(setting, duration)?,
             study,
         })
@@ -101,14 +105,14 @@ impl DesignStudy {
     /// The σ that decide every limit; without limits, the best of each group on the embedded paths.
     fn goals(&self, setting: &PathStudy, tour: &PathStudy, time: f64) -> Result<Goals, PathError> {
         if let Some(specification) = &self.specification {
-            return Ok(Goals::of_limits(specification, &expected(tour)?));
+            return Ok(Goals::of_limits(specification, &expected(tour)?.none));
         }
         let shipped = Shipped::all(setting, time)?.into_iter();
-        let mut estimates: Vec<Estimate> = shipped.filter_map(|of| of.estimate).collect();
-        if estimates.is_empty() {
-            estimates.push(expected(tour)?);
+        let mut paths: Vec<ByTerms<Estimate>> = shipped.filter_map(|of| of.expected).collect();
+        if paths.is_empty() {
+            paths.push(expected(tour)?);
         }
-        Ok(Goals::of_best(&estimates))
+        Ok(Goals::of_best(&paths))
     }
 
     /// First sentence of the path file.

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::expected::expected;
+use super::expected::{ByTerms, expected};
 use crate::calibration::Estimate;
 use crate::models::{self, Place, Room};
 use crate::study::path::{PathError, PathStudy};
@@ -19,7 +19,7 @@ pub struct Shipped {
     /// Factor by which its dwells are scaled.
     pub factor: f64,
     /// Expected σ; `None` if the moves alone take too long.
-    pub estimate: Option<Estimate>,
+    pub expected: Option<ByTerms<Estimate>>,
 }
 
 impl Shipped {
@@ -67,10 +67,10 @@ fn stretched(
         shortest = shortest.min(*dwell);
     }
     let study = (shortest >= SHORTEST).then(|| along(setting, path, name));
-    let estimate = study.flatten().map(|study| expected(&study)).transpose()?;
+    let expected = study.flatten().map(|study| expected(&study)).transpose()?;
     Ok(Shipped {
         name,
         factor,
-        estimate,
+        expected,
     })
 }

@@ -18,8 +18,8 @@ use turncal_report::path::{Report, in_words, moves_in_words};
 /// Searches for the best sequence of turns and dwells: turns between the faces, edges and corners of a cube, and full
 /// turns at several rates, within the limits of the table axes or by hand about body axes. With a specification, the
 /// path is the shortest one found that decides every limit. Without a specification, the path takes all of the
-/// available time and determines every group of parameters as well as possible. The terms given with --with are estimated
-/// too. The exit status is 3 if the σ are too large to decide a limit.
+/// available time and determines every group of parameters as well as possible, with and without the error terms that
+/// may be absent. The terms given with --with are estimated too. The exit status is 3 if the σ are too large to decide a limit.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal path design --time 524 -o mine.toml
