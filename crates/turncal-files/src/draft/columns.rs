@@ -234,9 +234,19 @@ fn split_time(sheet: &Sheet, names: &[Name]) -> Option<[usize; 2]> {
         (is_named || is_numbered && are_nanoseconds()) && is_whole(*k) && is_whole(k + 1)
     };
     let goes_on = |k: &usize| {
-        let seconds = forward(sheet.columns[*k].iter().copied());
-        let times = both(&sheet.columns[*k], &sheet.columns[k + 1]);
-        seconds.0 > 0.0 && seconds.0 < FORWARD && forward(times.into_iter()).0 >= FORWARD
+        let [seconds, rest] = [*k, k + 1].map(|k| &sheet.columns[k]);
+        let forward_of = |values: &[f64]| forward(values.iter().copied()).0;
+        let whole = forward_of(seconds);
+        // The fraction begins again with each second.
+        let begins = seconds.windows(2).zip(rest.windows(2));
+        let begins = begins.filter(|(whole, _)| whole[1] > whole[0]);
+        let begins: Vec<f64> = begins
+            .map(|(_, rest)| f64::from(rest[1] < rest[0]))
+            .collect();
+        whole > 0.0
+            && whole < FORWARD
+            && forward_of(&both(seconds, rest)) >= FORWARD
+            && begins.iter().sum::<f64>() >= FORWARD * begins.len() as f64
     };
     let mut pairs = (0..names.len().saturating_sub(1)).filter(is_pair);
     let pair = pairs.find(goes_on)?;
