@@ -78,10 +78,14 @@ pub fn of_ellipsoid(found: &Ellipsoid) -> Vec<Finding> {
         text,
         json!({ "unseen": around.len() }),
     );
+    let text = "The values do not determine the matrix of the magnetometer, so the corrected field may be wrong in \
+                every direction; the σ show the axes. Turn the sensor about all axes, so that the field points into all \
+                directions.";
+    let unknown = Finding::new(Kind::MagnetometerNotObserved, text.to_owned(), json!({}));
     let each = [
         (found.residual > VARIES).then_some(varies),
         (!around.is_empty()).then_some(uncovered),
-        (!found.estimate.is_shown()).then(not_observed),
+        (!found.estimate.is_shown()).then_some(unknown),
     ];
     each.into_iter().flatten().collect()
 }

@@ -166,7 +166,7 @@ fn lengths(columns: &[Vec<f64>]) -> impl Iterator<Item = usize> {
     all.take_while(move |length| length * FEWEST_WINDOWS <= rows)
 }
 
-fn likeliest(all: &Vec<Hypothesis>) -> f64 {
+fn likeliest(all: &[Hypothesis]) -> f64 {
     let all = all.iter().map(|of| of.likelihood);
     all.fold(f64::NEG_INFINITY, f64::max)
 }
