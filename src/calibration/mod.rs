@@ -52,7 +52,7 @@ pub use estimate::{Epoch, Estimate};
 pub use estimator::estimate;
 pub use leg::{Journey, Leg, Terms};
 pub use linearisation::{AttitudePrior, Linearisation};
-pub use magnetometer::{MagneticEstimate, MagneticPrior, ellipsoid};
+pub use magnetometer::{Ellipsoid, MagneticEstimate, MagneticPrior, ellipsoid};
 pub use model::Model;
 pub use noise::{NoisePolicy, NoiseReport, NoiseTest, Source, SourceFigures};
 pub use options::Options;
@@ -73,7 +73,7 @@ use record::Script;
 pub use result::at_temperature::TemperatureError;
 pub use result::correction::{Calibrated, Correction, CorrectionError};
 pub use result::frame::{Canonical, Named, in_body_frame};
-pub use result::magnetic::{FieldRecord, MagRecord, MagSigma};
+pub use result::magnetic::{EllipsoidRecord, FieldRecord, MagRecord, MagSigma};
 pub use result::nees::{Nees, nees};
 pub use result::record::truth_record;
 pub use result::thermal_record::{

@@ -6,8 +6,7 @@ use crate::calibration::{
     Budget, Calibration, CalibrationError, ClosedForm, Contradiction, Estimate, Finding, Method,
     Outcome, Problem, Progress, Quality, Reference, estimate, six_position,
 };
-use crate::imu::{PerSensor, Sensor};
-use crate::units::DEGREE;
+use crate::imu::Sensor;
 
 /// Result of one method for a problem.
 #[derive(Debug, Clone)]
@@ -57,17 +56,10 @@ impl Problem<'_> {
 
     /// Origin of a calibration of the problem, without the list of files.
     pub fn provenance(&self) -> Provenance {
-        let run = self.run();
-        let imu = &run.recording.imu;
         Provenance {
-            program: concat!("turncal ", env!("CARGO_PKG_VERSION")).to_owned(),
-            inputs: Vec::new(),
-            nominal: PerSensor::from_fn(|sensor| run.instrument.nominal.get(sensor).0.into()),
-            latitude_deg: (run.site.is_known).then_some(run.site.latitude / DEGREE),
-            height_m: run.site.height,
             duration_s: self.runs().map(|run| run.recording.imu.duration()).sum(),
-            rate_hz: 1.0 / imu.period,
             dwells: self.dwells().count(),
+            ..Provenance::of_run(self.run())
         }
     }
 }

@@ -106,6 +106,11 @@ impl Magnetometer {
         self.spans[span].count += 1;
     }
 
+    /// Sets the length of a span, s, before the first value.
+    pub fn in_spans_of(&mut self, length: f64) {
+        self.length = length;
+    }
+
     /// Stretches the clock by a factor.
     pub fn slower(&mut self, factor: f64) {
         self.start *= factor;

@@ -16,7 +16,7 @@ pub use dwells::imu::LONG_ENOUGH;
 use serde::{Deserialize, Serialize};
 
 use crate::earth::Site;
-use crate::imu::{BodyFrame, Instrument, PerSensor};
+use crate::imu::{BodyFrame, Instrument, PerSensor, Sensor};
 use crate::recording::{Recording, TableLog};
 use crate::turntable::TableAccuracy;
 use crate::units::DEGREE;
@@ -60,6 +60,13 @@ impl Run {
             Some(_) => Aiding::Table,
             None => Aiding::Velocity,
         }
+    }
+
+    /// Whether the recording has a magnetometer, but neither gyros nor accelerometers.
+    pub fn is_of_magnetometer(&self) -> bool {
+        let recording = &self.recording;
+        let has = |&sensor: &Sensor| recording.imu.has(sensor);
+        recording.magnetometer.is_some() && !Sensor::ALL.iter().any(has)
     }
 
     /// The table's readings, if they are observed.

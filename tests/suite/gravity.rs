@@ -1,5 +1,6 @@
 //! Gravity at rest alone: still files, tables of means, and logs without gyros.
 
+use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
@@ -14,8 +15,11 @@ use turncal::calibration::{
 use turncal::earth::Site;
 use turncal::imu::{GaussMarkov, Instrument, Noise, PerSensor, Prior, Sensor};
 use turncal::recording::Recording;
-use turncal::run::Run;
+use turncal::run::{Aiding, Run};
+use turncal::simulation::Scenario;
 use turncal::units::{DEGREE, MICRO_G};
+use turncal_files::Opened;
+use turncal_files::draft::Stated;
 
 use crate::shared::shared;
 
@@ -329,4 +333,51 @@ fn a_table_that_is_no_table_of_means_is_refused() {
     );
     refused("a,b\n1,2\n");
     refused("ax,ay,az\n0,0,0\n0,0,0\n");
+}
+
+#[test]
+fn full_turns_of_a_log_without_gyros_are_no_dwell() {
+    let imu = Scenario::load("nine-axis")
+        .unwrap()
+        .simulate(1, 0)
+        .unwrap()
+        .run
+        .recording
+        .imu;
+    let mut text = "t,ax,ay,az\n".to_owned();
+    for (k, sample) in imu.accel.iter().enumerate() {
+        let [x, y, z] = <[f64; 3]>::from(sample / imu.period);
+        writeln!(
+            text,
+            "{:.2},{x:.6},{y:.6},{z:.6}",
+            (k + 1) as f64 * imu.period
+        )
+        .unwrap();
+    }
+    let directory = tempfile::tempdir().unwrap();
+    let log = directory.path().join("accel.csv");
+    std::fs::write(&log, text).unwrap();
+    let run = Opened::new(&log, None, &Stated::default(), |_| ())
+        .unwrap()
+        .run;
+    let dwells = run.dwells(Aiding::Velocity);
+    assert!(dwells.len() > 10, "{}", dwells.len());
+    let second = (1.0 / imu.period).round() as usize;
+    for dwell in dwells {
+        let mean = dwell.force(&run);
+        for first in dwell
+            .samples
+            .clone()
+            .step_by(second)
+            .take(dwell.samples.len() / second)
+        {
+            let part = run.recording.imu.accel.sum(first..first + second);
+            // White noise of 1 s is below 1 mm/s², and a turn changes gravity by m/s².
+            assert!(
+                (part - mean).norm() < 0.05,
+                "{:?} {part} {mean}",
+                dwell.samples
+            );
+        }
+    }
 }

@@ -215,6 +215,7 @@ fn with_magnetometer(sensitivity: Matrix3<f64>, bias: [f64; 3], unit: &str) -> C
             },
             parameters: Vec::new(),
             covariance: Vec::new(),
+            ellipsoid: None,
             equation: String::new(),
         }),
         ..record()

@@ -34,6 +34,7 @@ mod logs;
 mod lot;
 mod lot_slow;
 mod magnetometer;
+mod magnetometer_alone;
 mod mat_7_3;
 mod mistaken;
 mod modules;

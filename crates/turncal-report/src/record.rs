@@ -13,20 +13,26 @@ pub fn document(calibration: &Calibration, name: &str) -> Document {
     document.verdict = values::verdict(calibration);
     document.lead.extend(origin(calibration));
     document.findings = in_order(&calibration.findings);
-    document.brief.push(values::table(calibration).into());
+    if !calibration.is_of_magnetometer() {
+        document.brief.push(values::table(calibration).into());
+    }
     let magnetometer = values::magnetometer(calibration);
     document.brief.extend(magnetometer.map(Into::into));
     document.brief.push(facts(calibration).into());
     document.both(parameters(calibration));
     document.both(noise(calibration));
     document.both(terms(calibration));
-    document.both(ieee::table(calibration));
+    if !calibration.is_of_magnetometer() {
+        document.both(ieee::table(calibration));
+    }
     document
 }
 
 /// Duration, rate and dwells of the recording.
 fn origin(calibration: &Calibration) -> Option<String> {
-    let of = calibration.provenance.as_ref()?;
+    let of = calibration.provenance.as_ref();
+    // Values of a magnetometer alone need no times.
+    let of = of.filter(|_| !calibration.is_of_magnetometer())?;
     let [duration, rate] = [of.duration_s, of.rate_hz].map(three_digits);
     Some(format!(
         "{duration} s at {rate} Hz, {}",
@@ -39,6 +45,28 @@ fn facts(calibration: &Calibration) -> Facts {
     let held_out = calibration.quality.as_ref().and_then(cross_validation);
     if let Some(words) = held_out {
         facts.push("excluded from fit", words);
+    }
+    if let Some(mag) = &calibration.mag
+        && let Some(of) = mag.ellipsoid
+    {
+        let percent = three_digits(100.0 * of.residual);
+        let unit = &mag.field.unit;
+        let magnitude = format!(
+            "field = correction (N − hard iron); its magnitude is {} {unit}",
+            mag.field.magnitude
+        );
+        facts.push("convention", format!("symmetric matrix; {magnitude}"));
+        facts.push(
+            "residual",
+            format!(
+                "{percent} % of the magnitude (RMS of {} values)",
+                count(of.values)
+            ),
+        );
+        facts.push(
+            "sphere",
+            format!("values in {} of {} equal parts", of.seen, of.parts),
+        );
     }
     if let Some(of) = &calibration.provenance {
         let files = of.inputs.iter().map(|input| input.name.as_str());

@@ -133,6 +133,10 @@ fn cell(calibration: &Calibration, name: &str, size: f64) -> String {
 /// Whether the calibration may be used, and how many parameters were determined.
 pub fn verdict(calibration: &Calibration) -> Option<(Word, String)> {
     let word = calibration.verdict.as_ref()?.word;
+    let findings = several(calibration.findings.len(), "finding");
+    if calibration.is_of_magnetometer() && word != Word::Failed {
+        return Some((word, format!("magnetometer alone, {findings}")));
+    }
     let all = calibration.parameters.len() + calibration.undetermined().count();
     let known = all - unobserved(calibration);
     let of_it = match word {
@@ -140,7 +144,6 @@ pub fn verdict(calibration: &Calibration) -> Option<(Word, String)> {
         Word::Partial => &determined(calibration),
         _ => &format!("{known} of {all} parameters determined"),
     };
-    let findings = several(calibration.findings.len(), "finding");
     Some((word, format!("{of_it}, {findings}")))
 }
 

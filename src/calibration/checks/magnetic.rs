@@ -1,10 +1,11 @@
 //! Checks of the magnetometer: whether it is determined, and whether the field is that of one place on the Earth.
 
+use nalgebra::Vector3;
 use serde_json::json;
 
-use crate::calibration::magnetometer::Alone;
+use crate::calibration::magnetometer::{Alone, PARTS};
 use crate::calibration::{
-    Finding, FindingKind as Kind, MagneticEstimate, Outcome, Problem, Source,
+    Ellipsoid, Finding, FindingKind as Kind, MagneticEstimate, Outcome, Problem, Source,
 };
 use crate::magnetic::MAGNETIC;
 use crate::number::three_digits;
@@ -47,6 +48,45 @@ pub fn alone(problem: &Problem, found: Option<&Alone>) -> Vec<Finding> {
     let figures = json!({ "chi_square": square, "freedom": freedom });
     let varies = is_large.then(|| Finding::new(Kind::FieldVaries, text, figures));
     let each = [varies, unlikely(problem, &found.estimate)];
+    each.into_iter().flatten().collect()
+}
+
+/// Findings on a magnetometer that was calibrated from its own values.
+pub fn of_ellipsoid(found: &Ellipsoid) -> Vec<Finding> {
+    let percent = three_digits(100.0 * found.residual);
+    let text = format!(
+        "The magnitude of the corrected field varies by {percent} % (RMS). The field depends on the place where the \
+         sensor is held, or the sensor was near steel or a current; the σ include the variation. Record away from steel \
+         and currents, and turn the sensor at one place."
+    );
+    let varies = Finding::new(
+        Kind::FieldVaries,
+        text,
+        json!({ "residual": found.residual }),
+    );
+    let around = |part: &Vector3<f64>| format!("({:+.1}, {:+.1}, {:+.1})", part.x, part.y, part.z);
+    let around: Vec<String> = found.unseen.iter().map(around).collect();
+    let text = format!(
+        "The field did not point into {} of {PARTS} equal parts of the sphere along the axes of the sensor: those around \
+         {}. There the calibration rests on the shape of an ellipsoid; the σ include this only if the sensor is linear. \
+         Turn the sensor also so that the field points there.",
+        around.len(),
+        around.join(", ")
+    );
+    let uncovered = Finding::new(
+        Kind::SphereNotCovered,
+        text,
+        json!({ "unseen": around.len() }),
+    );
+    let text = "The values do not determine the matrix of the magnetometer, so the corrected field may be wrong in \
+                every direction; the σ show the axes. Turn the sensor about all axes, so that the field points into all \
+                directions.";
+    let unknown = Finding::new(Kind::MagnetometerNotObserved, text.to_owned(), json!({}));
+    let each = [
+        (found.residual > VARIES).then_some(varies),
+        (!around.is_empty()).then_some(uncovered),
+        (!found.estimate.is_shown()).then_some(unknown),
+    ];
     each.into_iter().flatten().collect()
 }
 

@@ -1,6 +1,6 @@
 //! Estimate of a magnetometer and of the field at its site.
 
-use nalgebra::{DMatrix, SMatrix};
+use nalgebra::{DMatrix, Matrix3, SMatrix};
 
 use crate::calibration::constants::parameters;
 use crate::calibration::{Constant, Linearisation, Model, PARAMETERS, Posterior};
@@ -54,6 +54,19 @@ impl MagneticEstimate {
             covariance,
             cross,
         })
+    }
+
+    /// The estimate along other axes, to which this matrix turns the field.
+    pub fn along(&self, axes: &Matrix3<f64>) -> Self {
+        let mut by_matrix = MagneticMatrix::identity();
+        for row in [0, 3, 6] {
+            by_matrix.fixed_view_mut::<3, 3>(row, row).copy_from(axes);
+        }
+        let mut turned = self.clone();
+        turned.triad.matrix *= axes.transpose();
+        turned.covariance = by_matrix * self.covariance * by_matrix.transpose();
+        turned.cross = self.cross * by_matrix.transpose();
+        turned
     }
 
     /// Whether the output of each axis depends on the field.

@@ -8,7 +8,7 @@ mod start;
 #[cfg(test)]
 mod tests;
 
-pub use alone::{Alone, AtRest, Up, ellipsoid};
+pub use alone::{Alone, AtRest, Ellipsoid, PARTS, Up, ellipsoid};
 pub use estimate::MagneticEstimate;
 pub use prior::MagneticPrior;
 pub use start::with_magnetometer;

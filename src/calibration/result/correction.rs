@@ -60,6 +60,12 @@ pub enum CorrectionError {
          Correct scale and installation in the calibration, or calibrate again", .0.name()
     )]
     Singular(Sensor),
+    /// Gyros and accelerometers were not calibrated.
+    #[error(
+        "the calibration has only a magnetometer, but gyros and accelerometers are needed here. Export it as c, text, \
+         px4, ardupilot, betaflight, inav or imu-filter-madgwick, or use `turncal apply`"
+    )]
+    MagnetometerAlone,
     /// An unknown constant.
     #[error(
         "`{0}` in terms is not a parameter of a known error term. Calibrate again with this version, or remove the \

@@ -3,7 +3,8 @@
 use nalgebra::{DMatrix, Matrix3, SVector, Vector3};
 use serde::{Deserialize, Serialize};
 
-use crate::calibration::MagneticEstimate;
+use crate::calibration::magnetometer::PARTS;
+use crate::calibration::{Ellipsoid, MagneticEstimate};
 use crate::magnetic::{MAGNETIC, MagneticTriad};
 use crate::recording::Magnetometer;
 use crate::units::DEGREE;
@@ -35,8 +36,24 @@ pub struct MagRecord {
     /// Covariance of these constants.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub covariance: Vec<Vec<f64>>,
+    /// How well the values lie about the ellipsoid, for a magnetometer calibrated without gyros and accelerometers.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ellipsoid: Option<EllipsoidRecord>,
     /// The model in words.
     pub equation: String,
+}
+
+/// Values about an ellipsoid.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct EllipsoidRecord {
+    /// Number of values.
+    pub values: usize,
+    /// RMS residual of the magnitude, as a fraction of the field.
+    pub residual: f64,
+    /// Parts of the sphere that contain a value, out of `parts` equal parts.
+    pub seen: usize,
+    /// Number of equal parts.
+    pub parts: usize,
 }
 
 /// 1σ of a magnetometer.
@@ -84,7 +101,21 @@ impl MagRecord {
             },
             parameters: Vec::new(),
             covariance: Vec::new(),
+            ellipsoid: None,
             equation: EQUATION.to_owned(),
+        })
+    }
+
+    /// The record of an ellipsoid.
+    pub fn of_ellipsoid(found: &Ellipsoid, log: &Magnetometer) -> Option<Self> {
+        Some(Self {
+            ellipsoid: Some(EllipsoidRecord {
+                values: found.count,
+                residual: found.residual,
+                seen: PARTS - found.unseen.len(),
+                parts: PARTS,
+            }),
+            ..Self::of_estimate(&found.estimate, log)?
         })
     }
 

@@ -24,7 +24,7 @@ use crate::calibration::result::thermal_record::{RecordingRecord, ThermalRecord}
 use crate::calibration::{Direction, Finding, Quality, Verdict, Word};
 use crate::imu::{AXES, BodyFrame, InstallationForm, Nominal, Output, PerSensor, Sensor, Triad};
 use crate::run::Aiding;
-pub use magnetic::{FieldRecord, MagRecord, MagSigma};
+pub use magnetic::{EllipsoidRecord, FieldRecord, MagRecord, MagSigma};
 
 /// The version of the file format.
 pub const FORMAT: &str = "turncal-calibration/1";

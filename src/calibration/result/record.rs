@@ -2,22 +2,23 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use super::thermal_record::{RecordingRecord, ThermalRecord};
 use super::{
     BlockRecord, Calibration, ConsistencyRecord, EQUATION, EQUATION_WITH_TERMS, FORMAT,
-    FORMAT_WITH_TEMPERATURE, GravityRecord, Method, NisRecord, NoiseRecord, TermRecord, TestVector,
-    TriadRecord, rows,
+    FORMAT_WITH_TEMPERATURE, GravityRecord, Method, NisRecord, NoiseRecord, Provenance, TermRecord,
+    TestVector, TriadRecord, rows,
 };
 use crate::calibration::parameters::{Before, factor};
 use crate::calibration::{
     AtRest, Auxiliary, Budget, ClosedForm, Estimate, Finding, MagRecord, MagneticEstimate, Nis,
     Outcome, PARAMETERS, ParameterVector, Problem, Quality, Reference, TermEvidence, Verdict,
-    auxiliary_name, from_vector, parameter_name,
+    auxiliary_name, checks, ellipsoid, from_vector, parameter_name,
 };
 use crate::imu::{BodyFrame, InstallationForm, Nominal, Output, PerSensor, Sensor, Triad};
 use crate::run::Run;
+use crate::units::DEGREE;
 
 /// Inputs of the test vectors: rad/s, then m/s².
 const TEST_INPUTS: [[f64; 6]; 3] = [
@@ -123,6 +124,52 @@ impl Calibration {
 /// The record of a magnetometer, if the run has one and it was calibrated.
 fn mag_record(estimate: Option<&MagneticEstimate>, run: &Run) -> Option<MagRecord> {
     MagRecord::of_estimate(estimate?, run.recording.magnetometer.as_ref()?)
+}
+
+impl Calibration {
+    /// The calibration of a magnetometer without gyros and accelerometers: both triads are nominal. `None` if the values
+    /// do not determine an ellipsoid.
+    pub fn of_magnetometer(run: &Run) -> Option<Self> {
+        let log = run.recording.magnetometer.as_ref()?;
+        let mut found = ellipsoid(log)?;
+        if let Some(facts) = &run.recording.imu.log {
+            found.estimate = found.estimate.along(&facts.named.axes.matrix());
+        }
+        let nominal = TriadRecord {
+            scale: [1.0; 3],
+            installation: rows(&Matrix3::identity()),
+            bias: [0.0; 3],
+        };
+        let record = Self {
+            mag: Some(MagRecord::of_ellipsoid(&found, log)?),
+            provenance: Some(Provenance::of_run(run)),
+            meta: run.recording.meta.clone(),
+            ..Self::new(nominal, nominal)
+        };
+        Some(record.with_findings(checks::magnetic::of_ellipsoid(&found)))
+    }
+
+    /// Whether only a magnetometer was calibrated, from its own values.
+    pub fn is_of_magnetometer(&self) -> bool {
+        self.mag.as_ref().is_some_and(|mag| mag.ellipsoid.is_some())
+    }
+}
+
+impl Provenance {
+    /// Origin of a calibration of a run, without the list of files and the number of dwells.
+    pub fn of_run(run: &Run) -> Self {
+        let imu = &run.recording.imu;
+        Self {
+            program: concat!("turncal ", env!("CARGO_PKG_VERSION")).to_owned(),
+            inputs: Vec::new(),
+            nominal: PerSensor::from_fn(|sensor| run.instrument.nominal.get(sensor).0.into()),
+            latitude_deg: (run.site.is_known).then_some(run.site.latitude / DEGREE),
+            height_m: run.site.height,
+            duration_s: imu.duration(),
+            rate_hz: 1.0 / imu.period,
+            dwells: 0,
+        }
+    }
 }
 
 impl GravityRecord {

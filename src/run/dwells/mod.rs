@@ -115,15 +115,17 @@ impl Run {
             && if self.recording.imu.has(Sensor::Gyro) {
                 !self.turns(between, before)
             } else {
-                self.same_force(before, after)
+                let is_same = |of: &Dwell| of.samples.is_empty() || self.same_force(before, of);
+                is_same(after) && is_same(&Dwell::of(between))
             }
     }
 
-    /// Whether the accelerometers, within noise, give the same force in two dwells.
-    fn same_force(&self, before: &Dwell, after: &Dwell) -> bool {
-        let [before, after] = [before, after].map(|dwell| dwell.mean(Sensor::Accel, self));
-        let noise = (before.variance + after.variance).sqrt();
-        (before.output - after.output).norm() < STILL_FORCE + STILL_SIGMAS * noise
+    /// Whether the accelerometers, within noise, give the same mean force as in a dwell. Between two dwells they do if the
+    /// instrument does not turn, whatever its motion, because it is at rest before and after.
+    fn same_force(&self, before: &Dwell, other: &Dwell) -> bool {
+        let [before, other] = [before, other].map(|dwell| dwell.mean(Sensor::Accel, self));
+        let noise = (before.variance + other.variance).sqrt();
+        (before.output - other.output).norm() < STILL_FORCE + STILL_SIGMAS * noise
     }
 
     /// Whether the gyros turn during these samples.

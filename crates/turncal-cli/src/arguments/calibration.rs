@@ -5,8 +5,16 @@ use std::path::Path;
 use anyhow::{Context, bail};
 
 use turncal::calibration::result::Calibration;
-use turncal::calibration::{Finding, Level};
+use turncal::calibration::{CorrectionError, Finding, Level};
 use turncal_report::terminal::printable;
+
+/// The calibration read from this file, for a command that needs gyros and accelerometers.
+pub fn of_triads(record: Calibration, path: &Path) -> anyhow::Result<Calibration> {
+    if record.is_of_magnetometer() {
+        return Err(CorrectionError::MagnetometerAlone).with_context(|| path.display().to_string());
+    }
+    Ok(record)
+}
 
 /// Reads a calibration; if a temperature in °C is given, evaluates the calibration at this temperature. Refuses a
 /// calibration whose verdict is FAILED; with `force`, warns on standard error instead.

@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use anyhow::bail;
+
 use super::{gravity, height, latitude, positive};
 use turncal::imu::Sensor;
 use turncal_files::Opened;
@@ -66,6 +68,19 @@ impl OfLog {
 
     /// Reads a run, or a log with the information given in options; for a log, shows the detected fields.
     pub fn open(&self, path: &Path) -> anyhow::Result<Opened> {
+        let opened = self.open_any(path)?;
+        if opened.run.is_of_magnetometer() {
+            bail!(
+                "{}: the log has a magnetometer, but neither gyros nor accelerometers. Only check, calibrate and apply \
+                 use such a log",
+                path.display()
+            );
+        }
+        Ok(opened)
+    }
+
+    /// Does the same as [`Self::open`], also for a magnetometer alone.
+    pub fn open_any(&self, path: &Path) -> anyhow::Result<Opened> {
         self.open_with(path, |found| show_found(path, found))
     }
 

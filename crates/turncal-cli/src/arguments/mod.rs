@@ -10,7 +10,7 @@ mod sharding;
 mod values;
 mod with;
 
-pub use calibration::usable;
+pub use calibration::{of_triads, usable};
 pub use choice::{AIDINGS, FORMS, NOISE, REQUIRED, export_format, one_of};
 pub use delivery::{Delivery, Overwrite, keep};
 pub use error_term::{error_term, needs_table};

@@ -56,6 +56,8 @@ const FOLLOWING: &str = "Following a log";
 /// A campaign.toml lists several recordings of one instrument. These recordings are calibrated jointly: the parameters
 /// may depend on temperature and differ from day to day.
 ///
+/// A log with a magnetometer alone gives the ellipsoid of its values: symmetric matrix and hard iron.
+///
 /// If a sensor lies still in a different position in each of several logs, these logs are treated as one recording.
 ///
 /// Several run.toml files (or, with --lot, logs) are the units of a lot. turncal writes the calibration of each unit
@@ -229,8 +231,19 @@ impl Calibrate {
 
     fn one(&self, path: &Path) -> anyhow::Result<()> {
         let activity = Activity::new(format!("reading {}", path.display()));
-        let opened = self.of_log.open(path)?;
+        let opened = self.of_log.open_any(path)?;
         let run = &opened.run;
+        if run.is_of_magnetometer() {
+            let mut calibration = of_magnetometer(run)?;
+            record_inputs(&mut calibration, [path], run);
+            let mut document = report::record::document(&calibration, &run.recording.name);
+            let target = self.default_target(run);
+            let read = read_by(Some(&opened), target.as_deref(), path);
+            document
+                .brief
+                .push(files(target.as_deref(), &read, &document).into());
+            return self.deliver(&calibration, &document, (&opened, path));
+        }
         let problem = if self.temperature {
             let together = Together::default();
             let problem = self.estimation.together(&[run], &together);
@@ -258,28 +271,38 @@ impl Calibrate {
         problem: &Problem,
         (opened, path): (&Opened, &Path),
     ) -> anyhow::Result<()> {
-        let run = problem.run();
         let calibration = at_rest.record(problem);
-        let document = report::at_rest::document(at_rest, run, &calibration);
-        let target = self.target(|| format!("{}-calibration", run.recording.name));
+        let document = report::at_rest::document(at_rest, problem.run(), &calibration);
+        self.deliver(&calibration, &document, (opened, path))
+    }
+
+    /// Writes and shows a calibration that needs no solution of a problem.
+    fn deliver(
+        &self,
+        calibration: &Calibration,
+        document: &Document,
+        (opened, path): (&Opened, &Path),
+    ) -> anyhow::Result<()> {
+        let run = &opened.run;
+        let target = self.default_target(run);
         if let Some(target) = &target {
             let directory = self.overwrite.directory(target, &[path])?;
             let file = directory.path().join("calibration.json");
-            write_calibration(&calibration, &file, false)?;
-            write_report(&document, &directory.path().join("report"))?;
+            write_calibration(calibration, &file, false)?;
+            write_report(document, &directory.path().join("report"))?;
             opened.write_run(&directory.path())?;
             directory.commit()?;
         }
         if self.json {
             print(&calibration_json(
-                &calibration,
+                calibration,
                 Path::new("standard output"),
             )?)
         } else {
-            show(&document, false)
+            show(document, false)
         }?;
         say(&run.recording);
-        self.check_required(&run.recording.name, &calibration)
+        self.check_required(&run.recording.name, calibration)
     }
 
     fn campaign(&self, path: &Path) -> anyhow::Result<()> {
@@ -298,6 +321,11 @@ impl Calibrate {
     fn target(&self, default: impl FnOnce() -> String) -> Option<PathBuf> {
         let default = || (!self.json).then(|| PathBuf::from(default()));
         self.output.clone().or_else(default)
+    }
+
+    /// Output directory of a calibration that needs no solution of a problem.
+    fn default_target(&self, run: &Run) -> Option<PathBuf> {
+        self.target(|| format!("{}-calibration", run.recording.name))
     }
 
     /// Solves a problem, then writes and shows the result.
@@ -455,6 +483,17 @@ fn say(recording: &Recording) {
     for note in recording.doubts.iter().chain(&recording.notes) {
         tell!("note: {}", printable(note));
     }
+}
+
+/// The calibration of a magnetometer alone.
+pub fn of_magnetometer(run: &Run) -> anyhow::Result<Calibration> {
+    Calibration::of_magnetometer(run).with_context(|| {
+        format!(
+            "{}: the values of the magnetometer do not determine an ellipsoid. Turn the sensor about all axes, so that \
+             the field points into all directions",
+            run.recording.name
+        )
+    })
 }
 
 /// Solves a calibration problem, and shows each pass while doing so.

@@ -3,9 +3,10 @@
 use std::path::PathBuf;
 
 use crate::arguments::{Delivery, OfLog, run_or_log};
+use crate::calibrate::of_magnetometer;
 use crate::terminal::Activity;
 use turncal::survey::Survey;
-use turncal_report::check;
+use turncal_report::{check, record};
 
 /// Describes a run and the parameters that each method could determine
 ///
@@ -33,12 +34,16 @@ pub struct Check {
 impl Check {
     pub fn run(&self) -> anyhow::Result<()> {
         let activity = Activity::new("reading");
-        let run = self.of_log.open(&self.run)?.run;
+        let run = self.of_log.open_any(&self.run)?.run;
         let begun = self.delivery.begin(&[&self.run])?;
         activity.next("checking the run");
-        let survey = Survey::of(&run);
+        let document = if run.is_of_magnetometer() {
+            record::document(&of_magnetometer(&run)?, &run.recording.name)
+        } else {
+            check::document(&run, &Survey::of(&run))
+        };
         drop(activity);
-        begun.deliver(&check::document(&run, &survey))?;
+        begun.deliver(&document)?;
         if !self.delivery.json() {
             tell!("\nnext: turncal calibrate {}", said_of_the_log().join(" "));
         }

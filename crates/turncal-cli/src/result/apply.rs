@@ -8,13 +8,14 @@ use clap::error::ErrorKind;
 
 use crate::arguments::{OfLog, keep, run_or_log, usable};
 use crate::terminal::{Activity, stream};
-use turncal::calibration::result::Calibration;
+use turncal::calibration::result::{Calibration, MagRecord};
 use turncal::calibration::{Correction, TEMPERATURE_TOLERANCE, ThermalRecord};
 use turncal::imu::{Sensor, Term};
 use turncal::number::{count, rounded};
+use turncal::recording::Magnetometer;
 use turncal::run::Run;
 use turncal::units::PPM;
-use turncal_files::export::Samples;
+use turncal_files::export::{FieldSamples, Samples};
 use turncal_report::terminal::printable;
 
 /// A scale factor that differs by more than this many prior σ probably belongs to another instrument.
@@ -59,7 +60,11 @@ impl Apply {
         self.check_output();
         let record = usable(&self.calibration, None, self.force)?;
         let activity = Activity::new(format!("reading {}", self.run.display()));
-        let run = self.of_log.open(&self.run)?.run;
+        let run = self.of_log.open_any(&self.run)?.run;
+        if record.is_of_magnetometer() || run.is_of_magnetometer() {
+            drop(activity);
+            return self.magnetometer(&record, &run);
+        }
         let correction = Correction::for_run(&record, &run)
             .with_context(|| format!("{}, {}", self.calibration.display(), self.run.display()))?;
         let lost: usize = run.recording.imu.lost().iter().map(Range::len).sum();
@@ -76,10 +81,7 @@ impl Apply {
             run: &run,
             correction: &correction,
             fill: self.fill,
-            magnetometer: record.mag.as_ref().filter(|of| {
-                let log = run.recording.magnetometer.as_ref();
-                log.is_some_and(|log| log.unit == of.unit)
-            }),
+            magnetometer: magnetometer(&record, &run).map(|(of, _)| of),
             verdict: record.word(),
         };
         match &self.output {
@@ -113,6 +115,40 @@ impl Apply {
         Ok(())
     }
 
+    /// Writes the field of the magnetometer, one row per value.
+    fn magnetometer(&self, record: &Calibration, run: &Run) -> anyhow::Result<()> {
+        let Some((mag, log)) = magnetometer(record, run) else {
+            let other = other_magnetometer(record, run);
+            let other =
+                other.unwrap_or_else(|| "calibration or log has no magnetometer".to_owned());
+            bail!(
+                "{}, {}: {other}",
+                self.calibration.display(),
+                self.run.display()
+            );
+        };
+        let samples = FieldSamples {
+            mag,
+            log,
+            verdict: record.word(),
+        };
+        match &self.output {
+            Some(output) => {
+                keep(
+                    output,
+                    run.recording.files.iter().chain([&self.calibration]),
+                )?;
+                samples.write(output, self.force)?;
+            }
+            None => stream(|rows| samples.rows(rows))?,
+        }
+        tell!(
+            "wrote the corrected field of {} values",
+            count(log.values().count())
+        );
+        Ok(())
+    }
+
     /// Exits if the output does not have the name of a CSV file.
     fn check_output(&self) {
         if let Some(output) = &self.output {
@@ -125,6 +161,15 @@ impl Apply {
             }
         }
     }
+}
+
+/// The calibration of a magnetometer and its values in a run, if both are in one unit.
+fn magnetometer<'a>(
+    record: &'a Calibration,
+    run: &'a Run,
+) -> Option<(&'a MagRecord, &'a Magnetometer)> {
+    let both = record.mag.as_ref().zip(run.recording.magnetometer.as_ref());
+    both.filter(|(mag, log)| mag.unit == log.unit)
 }
 
 /// Remark on a magnetometer in another unit than that of the calibration.

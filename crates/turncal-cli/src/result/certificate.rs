@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 
 use crate::NotMet;
-use crate::arguments::Overwrite;
+use crate::arguments::{Overwrite, of_triads};
 use crate::terminal::print;
 use turncal::models;
 use turncal_files::{digest_of_bytes, read_laboratory};
@@ -58,7 +58,7 @@ impl Certificate {
         let read = |path: &Path| -> anyhow::Result<Vec<u8>> {
             small_file::read(path).with_context(|| format!("cannot read {}", path.display()))
         };
-        let calibration = turncal_files::read_calibration(path)?;
+        let calibration = of_triads(turncal_files::read_calibration(path)?, path)?;
         let bytes = read(path)?;
         let laboratory = read_laboratory(laboratory, |key| calibration.meta.get(key).cloned())?;
         let specification = self.specification.as_deref();

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::bail;
 use clap::error::ErrorKind;
 
-use crate::arguments::{Delivery, usable};
+use crate::arguments::{Delivery, of_triads, usable};
 use crate::terminal::short_names;
 use turncal::lot::{Lot, Unit};
 use turncal_report as report;
@@ -44,7 +44,8 @@ impl Compare {
         let named = short_names(&paths).into_iter().zip(&paths);
         let units = named.map(|(name, path)| {
             let force = self.delivery.force();
-            let mut calibration = usable(path, self.temperature_degc, force)?;
+            let read = usable(path, self.temperature_degc, force)?;
+            let mut calibration = of_triads(read, path)?;
             // A comparison leaves out units that did not converge, but this unit was requested explicitly.
             calibration.converged = calibration
                 .converged

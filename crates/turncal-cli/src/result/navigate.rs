@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use clap::ValueEnum;
 
-use crate::arguments::{Delivery, hours, latitude, number, usable};
+use crate::arguments::{Delivery, hours, latitude, number, of_triads, usable};
 use crate::terminal::{Activity, short_names};
 use turncal::calibration::{Calibration, Named};
 use turncal::imu::Sensor;
@@ -106,7 +106,10 @@ impl Navigate {
     pub fn run(&self) -> anyhow::Result<()> {
         let paths = [self.calibration.as_path(), self.truth.as_path()];
         let names = short_names(&paths);
-        let read = |path| usable(path, self.temperature_degc, self.delivery.force());
+        let read = |path| {
+            let force = self.delivery.force();
+            of_triads(usable(path, self.temperature_degc, force)?, path)
+        };
         let [calibration, truth] = [read(&self.calibration)?, read(&self.truth)?];
         let [of_calibration, of_truth] = [(&names[0], &calibration), (&names[1], &truth)]
             .map(|(name, record)| Named { name, record });

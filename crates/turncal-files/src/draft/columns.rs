@@ -4,8 +4,9 @@ use nalgebra::Vector3;
 
 use super::name::{Name, by_stem};
 use super::stated::StatedColumns;
-use super::triads::MagnetometerColumns;
-use super::triads::{Doubt, Identified, Triad, consecutive, is_uneven, overlap};
+use super::triads::{
+    Doubt, Identified, MagnetometerColumns, Triad, consecutive, is_uneven, overlap,
+};
 use crate::Sheet;
 use crate::quantity::Of;
 use turncal::imu::{PerSensor, Sensor};
@@ -70,19 +71,17 @@ impl Columns {
         let temperature = (0..names.len()).find(is_temperature);
         let quaternion = quaternion(sheet, time);
         let by_name = PerSensor::from_fn(|sensor| found.get(sensor).len());
-        let mut doubt = None;
-        if by_name.gyro == 0 || by_name.accel == 0 {
-            let taken = [time, nanoseconds, temperature].into_iter().flatten();
-            let taken = taken
-                .chain(of_triads)
-                .chain(quaternion.into_iter().flatten());
-            let taken: Vec<usize> = taken.collect();
-            let Identified {
-                triads,
-                doubt: of_it,
-            } = Identified::find(&sheet.columns, &candidates(sheet, &names, &taken, &found));
-            (found, doubt) = (triads, of_it);
-        }
+        let taken = [time, nanoseconds, temperature].into_iter().flatten();
+        let taken = taken.chain(quaternion.into_iter().flatten());
+        let taken: Vec<usize> = taken.chain(of_triads).collect();
+        let of_bare = MagnetometerColumns::of_bare(sheet);
+        let (mut found, doubt) = match of_bare {
+            Some(_) => Default::default(),
+            None => identified(sheet, &names, &taken, found),
+        };
+        let named = of_bare.or_else(|| MagnetometerColumns::find(sheet, &names));
+        let by_turns = || field_of_turns(sheet, &taken, doubt.as_ref(), &mut found);
+        let magnetometer = named.or_else(by_turns);
         let is_new = |&of: &Sensor| *by_name.get(of) == 0 && !found.get(of).is_empty();
         let others = |of| found.get(of).iter().skip(1).copied().collect();
         Self {
@@ -96,7 +95,7 @@ impl Columns {
             by_size: Sensor::ALL.iter().any(is_new),
             doubt,
             temperature,
-            magnetometer: MagnetometerColumns::find(sheet, &names),
+            magnetometer,
             quaternion,
         }
     }
@@ -234,9 +233,19 @@ fn split_time(sheet: &Sheet, names: &[Name]) -> Option<[usize; 2]> {
         (is_named || is_numbered && are_nanoseconds()) && is_whole(*k) && is_whole(k + 1)
     };
     let goes_on = |k: &usize| {
-        let seconds = forward(sheet.columns[*k].iter().copied());
-        let times = both(&sheet.columns[*k], &sheet.columns[k + 1]);
-        seconds.0 > 0.0 && seconds.0 < FORWARD && forward(times.into_iter()).0 >= FORWARD
+        let [seconds, rest] = [*k, k + 1].map(|k| &sheet.columns[k]);
+        let forward_of = |values: &[f64]| forward(values.iter().copied()).0;
+        let whole = forward_of(seconds);
+        // The fraction begins again with each second.
+        let begins = seconds.windows(2).zip(rest.windows(2));
+        let begins = begins.filter(|(whole, _)| whole[1] > whole[0]);
+        let begins: Vec<f64> = begins
+            .map(|(_, rest)| f64::from(rest[1] < rest[0]))
+            .collect();
+        whole > 0.0
+            && whole < FORWARD
+            && forward_of(&both(seconds, rest)) >= FORWARD
+            && begins.iter().sum::<f64>() >= FORWARD * begins.len() as f64
     };
     let mut pairs = (0..names.len().saturating_sub(1)).filter(is_pair);
     let pair = pairs.find(goes_on)?;
@@ -305,6 +314,38 @@ fn time(sheet: &Sheet, names: &[Name], forward: impl Fn(usize) -> (f64, f64)) ->
     let name = &names[best];
     let named_otherwise = name.is_time() == 0 && (name.sensor().is_some() || name.is_temperature());
     (!named_otherwise).then_some(best)
+}
+
+/// The triads by their names; if one has none, both by their values, with the reason why they are only a guess.
+fn identified(
+    sheet: &Sheet,
+    names: &[Name],
+    taken: &[usize],
+    by_name: PerSensor<Vec<Triad>>,
+) -> (PerSensor<Vec<Triad>>, Option<Doubt>) {
+    if !by_name.gyro.is_empty() && !by_name.accel.is_empty() {
+        return (by_name, None);
+    }
+    let candidates = candidates(sheet, names, taken, &by_name);
+    let Identified { triads, doubt } = Identified::find(&sheet.columns, &candidates);
+    (triads, doubt)
+}
+
+/// The magnetometer without names, unless nothing shows the gyros; accelerometers that are its columns are replaced.
+fn field_of_turns(
+    sheet: &Sheet,
+    taken: &[usize],
+    doubt: Option<&Doubt>,
+    found: &mut PerSensor<Vec<Triad>>,
+) -> Option<MagnetometerColumns> {
+    let pair = (found.gyro.first()?, found.accel.first()?);
+    let is_shown = doubt != Some(&Doubt::NoTurns);
+    let by_turns = || MagnetometerColumns::by_turns(sheet, taken, pair);
+    let (of, accel) = is_shown.then(by_turns)??;
+    let is_other = |triad: &Triad| !overlap(triad, &of.columns) && *triad != accel;
+    found.accel.retain(is_other);
+    found.accel.insert(0, accel);
+    Some(of)
 }
 
 /// Complete triads of a sensor, in order of their columns.

@@ -25,13 +25,14 @@ pub struct Found {
 impl Draft {
     /// All detected fields, in the order in which they are displayed.
     pub fn found(&self) -> Vec<Found> {
-        let mut found = vec![
-            self.time_found(),
-            self.triad_found(Sensor::Gyro),
-            self.triad_found(Sensor::Accel),
-        ];
+        let mut found = vec![self.time_found()];
+        let sensors = Sensor::ALL
+            .into_iter()
+            .filter(|_| !self.is_of_magnetometer());
+        found.extend(sensors.map(|sensor| self.triad_found(sensor)));
         found.extend(self.magnetometer_found());
-        found.extend([self.axes_found(), self.place_found()]);
+        found.push(self.axes_found());
+        found.extend((!self.is_of_magnetometer()).then(|| self.place_found()));
         found
     }
 
@@ -134,6 +135,14 @@ impl Draft {
                 clock.certainty,
             ),
             (None, Some(rate)) => (hertz(rate), clock.certainty),
+            (_, None) if self.is_of_magnetometer() => {
+                return Found::new(
+                    "time",
+                    "none",
+                    Certainty::Certain,
+                    "a magnetometer alone needs no times",
+                );
+            }
             (_, None) => {
                 let why = format!("{}; set --rate", clock.why);
                 return Found::new("time", "sample period", Certainty::Unknown, why);

@@ -134,6 +134,11 @@ impl Draft {
         let mut draft = Self::of_sheet(sheet, None, &stated);
         let columns = &mut draft.columns;
         let PerSensor { gyro, accel } = columns.triads;
+        let is_of_magnetometer =
+            columns.magnetometer.is_some() && accel.is_none() && gyro.is_none();
+        if is_of_magnetometer {
+            return Ok(draft);
+        }
         if accel.is_none() || gyro.is_some() || columns.time.is_some() {
             let expected =
                 format!("at least {FEWEST_ROWS}, or the mean values of several positions");
@@ -352,7 +357,13 @@ impl Draft {
     fn is_present(&self, sensor: Sensor) -> bool {
         let triads = &self.columns.triads;
         let none = triads.gyro.is_none() && triads.accel.is_none();
-        none || triads.get(sensor).is_some()
+        none && !self.is_of_magnetometer() || triads.get(sensor).is_some()
+    }
+
+    /// Whether the log has a magnetometer, but neither gyros nor accelerometers.
+    fn is_of_magnetometer(&self) -> bool {
+        let PerSensor { gyro, accel } = self.columns.triads;
+        self.columns.magnetometer.is_some() && gyro.is_none() && accel.is_none()
     }
 }
 

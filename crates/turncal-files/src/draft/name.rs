@@ -100,7 +100,11 @@ impl Name {
             let within = Self::of(inside);
             match found {
                 // `%float(RawGyroX)`
-                None if within.axis.is_some() && within.sensor().is_some() => return within,
+                None if within.axis.is_some()
+                    && (within.sensor().is_some() || within.is_magnetic()) =>
+                {
+                    return within;
+                }
                 // An index is not a unit.
                 None if inside.chars().all(|c| c.is_ascii_digit()) => {}
                 _ => rest = name[..open].to_owned(),
@@ -336,6 +340,8 @@ mod tests {
             ),
             (3, Some("ns"))
         );
+        let compass = Name::of("%float(RawCompassY)");
+        assert!(compass.is_magnetic() && compass.axis == Some('y'));
         assert!(Name::of("PacketCounter").is_counter() && Name::of("Temp_C").is_temperature());
     }
 }

@@ -320,6 +320,17 @@ fn seconds_and_nanoseconds_are_one_time_with_and_without_names() {
 }
 
 #[test]
+fn a_level_that_rises_seldom_beside_milliseconds_is_no_second() {
+    // The third axis of a magnetometer, then the times at which a reader began and ended.
+    let text = draft("", |k, v| {
+        let time = format!("{},{}", 20 * k + 2, 20 * k + 3);
+        format!("{},{},{time}", joined(&v, ","), 3815 + k / 400)
+    });
+    has(&text, &["columns = { time = \"8\", gyro = "]);
+    assert!(!text.contains("time = ["), "{text}");
+}
+
+#[test]
 fn a_rate_in_a_comment_decides_what_a_time_without_a_unit_is() {
     let comments = "// Start Time: Unknown\n// Update Rate: 100.0Hz\n";
     let names = "Acc_X\tAcc_Y\tAcc_Z\tGyr_X\tGyr_Y\tGyr_Z\tRoll\n";

@@ -154,7 +154,7 @@ impl Draft {
     fn period(&self, remarks: &mut Remarks) -> Option<Positive> {
         let (path, clock) = ("imu.sample_period_s", &self.clock);
         let Some(period) = clock.period else {
-            if !self.rows_show_period() {
+            if !self.rows_show_period() && !self.is_of_magnetometer() {
                 let why = "time between rows in s; a counter does not give it";
                 remarks.open(path, why);
             }
@@ -232,7 +232,9 @@ impl Draft {
     }
 
     fn columns(&self, remarks: &mut Remarks) -> ImuColumns {
-        self.doubts_of_triads(remarks);
+        if !self.is_of_magnetometer() {
+            self.doubts_of_triads(remarks);
+        }
         let (path, columns) = ("imu.columns", &self.columns);
         let time = columns.time.map(|time| match columns.nanoseconds {
             Some(further) => {
@@ -240,11 +242,14 @@ impl Draft {
             }
             None => TimeColumn::One(self.name(time)),
         });
-        if time.is_none() {
+        if time.is_none() && !self.is_of_magnetometer() {
             self.without_time(remarks);
         }
         let known = columns.triads.gyro.or(columns.triads.accel);
-        for sensor in Sensor::ALL {
+        for sensor in Sensor::ALL
+            .into_iter()
+            .filter(|_| !self.is_of_magnetometer())
+        {
             let all: Vec<usize> = (0..columns.names.len()).collect();
             let why = || {
                 let (name, all) = (sensor.name(), self.list(&all));
@@ -354,6 +359,9 @@ impl Draft {
     }
 
     fn noise_fields(&self, remarks: &mut Remarks) -> NoiseFields {
+        if self.is_of_magnetometer() {
+            return NoiseFields::new();
+        }
         remarks.before(
             "imu.noise",
             "white noise; if this field is omitted, turncal estimates the noise from the recording",

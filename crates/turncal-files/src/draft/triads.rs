@@ -11,7 +11,7 @@ mod magnetometer;
 pub use fit::Triad;
 use fit::{Moments, Order};
 pub use magnetometer::MagnetometerColumns;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use turncal::imu::{Output, PerSensor, Sensor};
 use turncal::statistics::{FALSE_ALARM, median};
@@ -27,6 +27,8 @@ const MOST_WINDOWS: usize = 512;
 const FEWEST_WINDOWS: usize = 64;
 /// Scatter of the logarithm of the magnitude of a triad, above which it does not measure gravity.
 const UNEVEN: f64 = 0.2;
+/// cos² of the largest inclination of a field that differs from gravity, 80°.
+const NEAR_GRAVITY: f64 = 0.03;
 /// Raw accelerometers measure gravity within this factor.
 const TOLERANCE: f64 = 1.25;
 
@@ -71,14 +73,7 @@ pub fn overlap(a: &Triad, b: &Triad) -> bool {
 impl Identified {
     /// Identifies the triads among these candidates.
     pub fn find(columns: &[Vec<f64>], candidates: &PerSensor<Vec<Triad>>) -> Self {
-        let rows = columns.first().map_or(0, Vec::len);
-        let lengths = (0..).map(|power| 1 << power);
-        let lengths = lengths.take_while(|length| length * FEWEST_WINDOWS <= rows);
-        let likeliest = |all: &Vec<Hypothesis>| {
-            let all = all.iter().map(|of| of.likelihood);
-            all.fold(f64::NEG_INFINITY, f64::max)
-        };
-        let all = lengths
+        let all = lengths(columns)
             .map(|length| hypotheses(&Windows::new(columns, candidates, length), candidates));
         let all = all.max_by(|a, b| likeliest(a).total_cmp(&likeliest(b)));
         let by_turns = Self::by_turns(columns, &all.unwrap_or_default());
@@ -162,6 +157,52 @@ impl Identified {
             doubt,
         }
     }
+}
+
+/// Lengths of windows that are compared, in rows.
+fn lengths(columns: &[Vec<f64>]) -> impl Iterator<Item = usize> {
+    let rows = columns.first().map_or(0, Vec::len);
+    let all = (0..).map(|power| 1 << power);
+    all.take_while(move |length| length * FEWEST_WINDOWS <= rows)
+}
+
+fn likeliest(all: &[Hypothesis]) -> f64 {
+    let all = all.iter().map(|of| of.likelihood);
+    all.fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// Whether the last triad turns with the gyros and is not a copy of gravity; the false-alarm rate is that of this many
+/// triads with all orders and lengths of windows.
+fn turns_as_a_field(columns: &[Vec<f64>], [gyro, accel, field]: [Triad; 3], tried: usize) -> bool {
+    let candidates = PerSensor {
+        gyro: vec![gyro],
+        accel: vec![field],
+    };
+    let all = lengths(columns).map(|length| {
+        let windows = Windows::new(columns, &candidates, length);
+        likeliest(&hypotheses(&windows, &candidates))
+    });
+    let all: Vec<f64> = all.collect();
+    let tried = all.len() * Order::all().count() * tried;
+    let found = all.into_iter().fold(f64::NEG_INFINITY, f64::max);
+    found > (tried as f64 / FALSE_ALARM).ln() && unlike(columns, &field, &accel) > NEAR_GRAVITY
+}
+
+/// Fraction of the variance of a triad that is not linear in another triad.
+fn unlike(columns: &[Vec<f64>], triad: &Triad, other: &Triad) -> f64 {
+    let [own, of_other] = [triad, other].map(|of| of.map(|k| centred(columns[k].clone())));
+    let row = |of: &[Vec<f64>; 3], row: usize| Vector3::from([0, 1, 2].map(|k| of[k][row]));
+    let (mut square, mut normal, mut product) = (0.0, Matrix3::zeros(), Matrix3::zeros());
+    for k in 0..own[0].len() {
+        let (value, by) = (row(&own, k), row(&of_other, k));
+        if (value + by).sum().is_finite() {
+            square += value.norm_squared();
+            normal += by * by.transpose();
+            product += by * value.transpose();
+        }
+    }
+    let solved = normal.try_inverse().unwrap_or_default() * product;
+    1.0 - solved.dot(&product) / square
 }
 
 /// Pairs of candidates with all orders of the gyro axes whose turns explain most of the changes.

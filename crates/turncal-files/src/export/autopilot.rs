@@ -70,7 +70,14 @@ fn single(values: &Values) -> PerSensor<Affine> {
 }
 
 /// Parameters whose names have `#` in place of the axis: offsets of the gyros, offsets and scales of the accelerometers.
-fn parameters(program: &PerSensor<Affine>, [gyro, offset, scale]: [&str; 3]) -> Parameters {
+fn parameters(
+    values: &Values,
+    program: &PerSensor<Affine>,
+    [gyro, offset, scale]: [&str; 3],
+) -> Parameters {
+    if values.record.is_of_magnetometer() {
+        return Parameters::new();
+    }
     let PerSensor { gyro: g, accel: a } = program;
     let of_axis = |name: &str, k: usize, value: f64| (name.replace('#', UPPER[k]), value);
     let gyros = (0..3).map(|k| of_axis(gyro, k, g.offset[k]));
@@ -113,7 +120,7 @@ fn px4_lines(parameters: Parameters) -> String {
 pub fn px4(values: &Values) -> Exported {
     let program = single(values);
     let names = ["CAL_GYRO0_#OFF", "CAL_ACC0_#OFF", "CAL_ACC0_#SCALE"];
-    let mut text = px4_lines(parameters(&program, names));
+    let mut text = px4_lines(parameters(values, &program, names));
     let names = ["CAL_MAG0_#OFF", "CAL_MAG0_#SCALE", "CAL_MAG0_#ODIAG"];
     let (compass, of_compass) = of_compass(values, (PX4, 1.0), names);
     let id = "CAL_MAG0_ID: set it to the device_id that `listener sensor_mag` shows";
@@ -167,7 +174,7 @@ pub fn ardupilot(values: &Values) -> Exported {
         parameters.into_iter().map(line).collect()
     };
     let names = ["INS_GYROFFS_#", "INS_ACCOFFS_#", "INS_ACCSCAL_#"];
-    let mut text = lines(parameters(&program, names));
+    let mut text = lines(parameters(values, &program, names));
     let names = ["COMPASS_OFS_#", "COMPASS_DIA_#", "COMPASS_ODI_#"];
     let (compass, of_compass) = of_compass(values, (ARDUPILOT, -1.0), names);
     text += &lines(compass);
@@ -231,14 +238,19 @@ pub fn betaflight(values: &Values) -> Exported {
     let compass = compass.map(|of| (of.offset.map(f64::round), of.residual(&Matrix3::identity())));
     let (compass, residual) = compass.unzip();
     let compass = compass.map(|zero| line("mag_calibration", zero, ""));
-    Remarks::of_program(values, reads, &program, &notes)
+    let compass = compass.unwrap_or_default() + "save\n";
+    let remarks =
+        Remarks::of_program(values, reads, &program, &notes).omitting(of_compass.or(residual));
+    if values.record.is_of_magnetometer() {
+        return remarks.above(&compass);
+    }
+    remarks
         .defines([
             of_counts("an accelerometer", COUNTS_PER_G, "g"),
             "these values are for a log recorded with acc_calibration = 0,0,0,0, because Betaflight subtracts \
              acc_calibration before logging".to_owned(),
         ])
-        .omitting(of_compass.or(residual))
-        .above(&(line("acc_calibration", zero, ",1") + &compass.unwrap_or_default() + "save\n"))
+        .above(&(line("acc_calibration", zero, ",1") + &compass))
 }
 
 /// The magnetometer of a program that reads counts; or the reason why there is none.
@@ -271,7 +283,7 @@ pub fn inav(values: &Values) -> Exported {
         ("accgain", &gain),
         ("gyro_zero", &gyro_zero),
     ];
-    let mut text = all.map(|(name, values)| set(name, values)).concat();
+    let mut text = String::new();
     let (compass, of_compass) = counted_compass(values, INAV);
     let compass = compass.map(|of| {
         let gain = of
@@ -288,8 +300,13 @@ pub fn inav(values: &Values) -> Exported {
         "#",
         "commands for the INAV command line, computed from rad/s and m/s^2",
     );
-    Remarks::of_program(values, reads, &program, &[UNCORRECTED])
-        .omitting(of_compass.or(compass))
+    let remarks = Remarks::of_program(values, reads, &program, &[UNCORRECTED]);
+    let remarks = remarks.omitting(of_compass.or(compass));
+    if values.record.is_of_magnetometer() {
+        return remarks.above(&(text + "save\n"));
+    }
+    let triads = all.map(|(name, values)| set(name, values)).concat();
+    remarks
         .defines([
             of_counts("an accelerometer", COUNTS_PER_G, "g"),
             of_counts("gyros", COUNTS_PER_RAD_S, "rad/s"),
@@ -297,5 +314,5 @@ pub fn inav(values: &Values) -> Exported {
              OFF, because INAV applies its own values before logging"
                 .to_owned(),
         ])
-        .above(&(text + "set init_gyro_cal = OFF\nsave\n"))
+        .above(&(triads + &text + "set init_gyro_cal = OFF\nsave\n"))
 }

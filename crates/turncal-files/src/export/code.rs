@@ -20,15 +20,16 @@ pub fn write(values: &Values) -> Exported {
         let matrix = values.correction.matrix.get(sensor);
         constants(sensor.name(), matrix, values.correction.bias.get(sensor))
     };
+    let is_of_triads = !values.record.is_of_magnetometer();
+    let triads = || Sensor::ALL.map(constants_of).concat() + FUNCTION + "\n";
     let text = format!(
         "
 #ifndef TURNCAL_CALIBRATION_H
 #define TURNCAL_CALIBRATION_H
 
-{}{FUNCTION}
-{}{}{}#endif
+{}{}{}{}#endif
 ",
-        Sensor::ALL.map(constants_of).concat(),
+        is_of_triads.then(triads).unwrap_or_default(),
         magnetometer(values),
         at_temperature(values),
         test_vectors(values)
@@ -37,7 +38,7 @@ pub fn write(values: &Values) -> Exported {
     may be the same array; each test vector contains the raw values, then the calibrated values";
     Remarks::new(values, "//", &[SIGMA])
         .defines(equation(values))
-        .defines([functions.to_owned()])
+        .defines(is_of_triads.then(|| functions.to_owned()))
         .defines(polynomial_words(values))
         .defines(magnetic_words(values))
         .above(&text)

@@ -49,6 +49,9 @@ impl<'a> Remarks<'a> {
         program: &PerSensor<Affine>,
         omissions: &[&str],
     ) -> Self {
+        if values.record.is_of_magnetometer() {
+            return Self::new(values, mark, &[SIGMA]);
+        }
         let residuals = Residual::all(values, program);
         let mut remarks = Self::new(values, mark, &[omissions, &[SIGMA]].concat()).reads(reads);
         let words = residuals.iter().map(Residual::words);
@@ -131,6 +134,7 @@ impl<'a> Remarks<'a> {
 /// Program, method, instrument and verdict.
 pub fn title(record: &Calibration) -> String {
     let method = match (record.method, record.aiding) {
+        _ if record.is_of_magnetometer() => "ellipsoid of the magnetometer",
         (Some(Method::Ekf), Some(Aiding::Table)) => "Kalman filter, standstill and table attitude",
         (Some(Method::Ekf), _) => "Kalman filter, standstill only",
         (Some(Method::SixPosition), _) => "closed form with static positions",
@@ -156,14 +160,24 @@ pub fn title(record: &Calibration) -> String {
 pub fn magnetic_words(values: &Values) -> Option<String> {
     let mag = values.record.mag.as_ref()?;
     Some(format!(
-        "magnetometer: {}; N in {}, field in {}, along the axes of u",
-        mag.equation, mag.unit, mag.field.unit
+        "magnetometer: {}; N in {}, field in {}, along {}",
+        mag.equation,
+        mag.unit,
+        mag.field.unit,
+        if mag.ellipsoid.is_some() {
+            "right, front, up; the matrix is symmetric by convention"
+        } else {
+            "the axes of u"
+        }
     ))
 }
 
 /// Definitions of `N` and `u`, for formats that contain the values of the calibration file unchanged.
-pub fn equation(values: &Values) -> [String; 2] {
+pub fn equation(values: &Values) -> Vec<String> {
     let record = values.record;
+    if record.is_of_magnetometer() {
+        return Vec::new();
+    }
     let axes = match &record.columns {
         Some(PerSensor { gyro, accel }) => format!(
             "axes x, y, z of N and u (right, front, up): columns {} and {} of the log",
@@ -174,7 +188,7 @@ pub fn equation(values: &Values) -> [String; 2] {
         z) converts values along front, left, up"
             .to_owned(),
     };
-    [
+    vec![
         format!(
             "{EQUATION}; N: raw output per second (pulses and increments divided by the sample period), gyros in {}, \
              accelerometers in {}",

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use crate::{write_rows, write_whole_with};
 use turncal::calibration::result::MagRecord;
 use turncal::calibration::{Correction, Word};
-use turncal::recording::nanoseconds;
+use turncal::recording::{Magnetometer, nanoseconds};
 use turncal::run::Run;
 use turncal_input::FileError;
 
@@ -44,6 +44,44 @@ pub struct Samples<'a> {
     pub verdict: Option<Word>,
 }
 
+/// The field of a magnetometer alone.
+#[derive(Debug, Clone, Copy)]
+pub struct FieldSamples<'a> {
+    /// Calibration of the magnetometer.
+    pub mag: &'a MagRecord,
+    /// Its values.
+    pub log: &'a Magnetometer,
+    /// Verdict of the calibration, used as the name of the last column.
+    pub verdict: Option<Word>,
+}
+
+impl FieldSamples<'_> {
+    /// Writes one row per value, with its time.
+    pub fn rows(&self, file: &mut dyn Write) -> io::Result<()> {
+        let columns = in_unit(&self.mag.field.unit);
+        let verdict = self.verdict.map(|word| format!(",{}", word.column()));
+        let one = if verdict.is_some() { ",1" } else { "" };
+        writeln!(file, "time_s{columns}{}", verdict.unwrap_or_default())?;
+        for (time, field) in self.mag.corrected(self.log) {
+            let time = nanoseconds(time);
+            writeln!(file, "{time},{},{},{}{one}", field.x, field.y, field.z)?;
+        }
+        Ok(())
+    }
+
+    /// Writes the rows into a complete file, as [`Samples::write`].
+    pub fn write(&self, path: &Path, force: bool) -> Result<(), FileError> {
+        write_whole_with(path, force, |file| {
+            write_rows(path, file, |rows| self.rows(rows))
+        })
+    }
+}
+
+/// Columns of the field in this unit.
+fn in_unit(unit: &str) -> &'static str {
+    if unit == "T" { IN_TESLA } else { RELATIVE }
+}
+
 impl Samples<'_> {
     /// Writes one row per log row, with [`HEADER`] first; for a temperature-dependent calibration, `in_range` states
     /// whether the calibration is valid at the temperature of the row. Each row contains the means over its sample, so
@@ -55,8 +93,7 @@ impl Samples<'_> {
         let filled = optional(self.fill, ",filled");
         let verdict = self.verdict.map(|word| format!(",{}", word.column()));
         let verdict = verdict.unwrap_or_default();
-        let field = self.magnetometer.map(|of| &*of.field.unit);
-        let field = field.map_or("", |unit| if unit == "T" { IN_TESLA } else { RELATIVE });
+        let field = self.magnetometer.map_or("", |of| in_unit(&of.field.unit));
         writeln!(file, "{HEADER}{field}{in_range}{filled}{verdict}")?;
         let imu = &self.run.recording.imu;
         let field = self.field();

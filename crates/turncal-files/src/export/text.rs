@@ -14,7 +14,9 @@ pub fn write(values: &Values) -> Exported {
         "\n{:<26}{:>25}{:>12}  unit",
         "name", "value", "1 sigma"
     )];
-    for sensor in Sensor::ALL {
+    let triads = Sensor::ALL.into_iter();
+    let triads = triads.filter(|_| !values.record.is_of_magnetometer());
+    for sensor in triads.clone() {
         lines.extend(triad(values, sensor));
     }
     for (name, term) in &values.record.terms {
@@ -23,7 +25,7 @@ pub fn write(values: &Values) -> Exported {
         let unit = of_term.map_or("rad", |term| term.entry().si_unit);
         lines.push(row(name, term.value, term.sigma, unit));
     }
-    for sensor in Sensor::ALL {
+    for sensor in triads {
         let matrix = values.correction.matrix.get(sensor);
         let unit = format!("{} per {}", Values::input(sensor), values.unit(sensor));
         lines.extend(places().map(|(i, j, place)| {

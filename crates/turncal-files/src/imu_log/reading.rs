@@ -114,8 +114,11 @@ impl<'a> Reading<'a> {
         [blank, lacking].into_iter().flatten()
     }
 
-    /// Fewest samples of a recording, or of a table of means.
+    /// Fewest samples of a recording, of a table of means, or of a log without both triads.
     fn fewest(&self) -> usize {
+        if self.places.iter().all(Option::is_none) {
+            return 1;
+        }
         let may_be_means = !self.log.continuous && self.log.clock_of_rows().column.is_none();
         if may_be_means { 1 } else { FEWEST_SAMPLES }
     }

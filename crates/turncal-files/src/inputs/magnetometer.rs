@@ -9,6 +9,7 @@ use crate::schema::Names;
 use crate::schema::instrument::Fields;
 use turncal::calibration::Source as NoiseSource;
 use turncal::earth::Site;
+use turncal::imu::Sensor;
 use turncal::magnetic::LocalField;
 use turncal::recording::{ColumnFacts, ImuSamples, Magnetometer};
 use turncal_input::{FileError, list, suggestion};
@@ -123,6 +124,10 @@ impl MagnetometerLog<'_> {
             None => None,
         };
         let mut series = self.empty;
+        if !Sensor::ALL.iter().any(|&sensor| imu.has(sensor)) {
+            // Nothing shows the motion within a span.
+            series.in_spans_of(imu.period);
+        }
         let mut first = [(); 3].map(|()| Vec::new());
         while csv.advance()? && !csv.may_be_cut() {
             let is_other = |(place, number)| csv.number(place).is_ok_and(|value| value != number);

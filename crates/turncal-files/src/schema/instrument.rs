@@ -29,6 +29,8 @@ pub const USUAL_BIAS: PerSensor<f64> = PerSensor {
 };
 /// Sample period that is assumed until it has been estimated from motion, s.
 pub const USUAL_PERIOD: f64 = 0.01;
+/// Sample period of values without times, s.
+const PERIOD_OF_VALUES: f64 = 1.0;
 /// Relative 1σ of a rate that is not confirmed by time stamps: the tolerance of the oscillators in MEMS sensors.
 pub const RATE_SIGMA: f64 = 0.01;
 /// Maximum relative 1σ of a scale factor.
@@ -130,6 +132,10 @@ impl<'a> Fields<'a> {
 
     /// The default period if none is stated; the period can only be estimated for rates without other logs.
     fn with_usual_period(&self, clock: &mut Clock) -> Result<bool, FileError> {
+        if self.run.imu.is_of_magnetometer() && clock.column.is_none() {
+            // The values of a magnetometer alone need no times.
+            clock.period = clock.period.or(Some(PERIOD_OF_VALUES));
+        }
         if clock.column.is_some() || clock.period.is_some() {
             return Ok(false);
         }
@@ -216,6 +222,9 @@ impl<'a> Fields<'a> {
             );
             let unit = imu.of(sensor).unit.map(str::to_owned);
             return unit.ok_or_else(|| self.document.missing(&path, meaning));
+        }
+        if imu.is_of_magnetometer() {
+            return Ok("count".to_owned());
         }
         if imu.accel_from.is_some() || !Sensor::ALL.into_iter().any(is_there) {
             let path = format!("imu.columns.{name}");

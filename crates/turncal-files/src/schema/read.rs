@@ -303,7 +303,8 @@ impl Fields<'_> {
             site.gravity_sigma = sigma.0 * MILLIGAL;
         }
         let note = place_note(&site, file.gravity_m_s2.is_some(), height.is_some());
-        self.notes.extend(note);
+        self.notes
+            .extend(note.filter(|_| !self.run.imu.is_of_magnetometer()));
         Ok(site)
     }
 }

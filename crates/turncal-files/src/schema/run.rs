@@ -138,6 +138,14 @@ impl ImuFile {
         self.body_axes.map_or(AxisOrder::IDENTITY, BodyAxes::order)
     }
 
+    /// Whether the log has a magnetometer, but neither gyros nor accelerometers.
+    pub fn is_of_magnetometer(&self) -> bool {
+        let ImuColumns {
+            gyro, accel, mag, ..
+        } = &self.columns;
+        mag.is_some() && gyro.is_none() && accel.is_none()
+    }
+
     pub fn of(&self, sensor: Sensor) -> TriadFields<'_> {
         let (columns, prior) = (&self.columns, &self.prior);
         let full_scale = sensor.pick(self.gyro_full_scale, self.accel_full_scale);

@@ -225,6 +225,11 @@ kinds! {
         "The dwells do not determine the magnetometer: at least five attitudes are needed whose field directions do not \
          lie in one plane, and they must agree with one field. Add dwells with each axis up and down."
         "The magnetometer was not calibrated, because the positions do not determine it."
+    SphereNotCovered = "W39" "sphere-not-covered" Note:
+        "A magnetometer was calibrated from its own values, and in some parts of the sphere there are none. The \
+         ellipsoid is determined by the other parts. Turn the sensor also so that the field points into the parts that \
+         the finding lists: slowly about each axis, then about the axes between them."
+        "The magnetometer was not turned into all directions of the field."
 }
 
 impl Kind {

@@ -4,16 +4,17 @@
 //! because all dwells have one inclination; without gravity, the matrix is lower triangular by convention.
 
 mod at_rest;
+mod ellipsoid;
 mod rows;
 mod start;
 
-use nalgebra::{DMatrix, DVector, SMatrix, SVector, Vector3};
+use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
 use super::{MagneticEstimate, MagneticPrior};
 use crate::calibration::constants::inverse;
 use crate::magnetic::{MAGNETIC, MagneticTriad, MagneticVector};
-use crate::recording::{MagneticMean, Magnetometer};
 pub use at_rest::{AtRest, Up};
+pub use ellipsoid::{Ellipsoid, PARTS, ellipsoid};
 use rows::Rows;
 
 /// Maximum number of iterations.
@@ -75,27 +76,6 @@ impl Alone {
         }
         None
     }
-}
-
-/// A magnetometer from its own values alone: each span of the log is one, whatever the motion. The noise is that of the
-/// residuals. `None` if the values do not cover the sphere.
-pub fn ellipsoid(log: &Magnetometer) -> Option<MagneticEstimate> {
-    let prior = MagneticPrior::of_log(log);
-    let rest = |(_, value): (f64, Vector3<f64>)| AtRest {
-        mean: MagneticMean {
-            output: value / log.nominal,
-            sigma: Vector3::repeat(USUAL_NOISE),
-        },
-        up: None,
-    };
-    let rests: Vec<AtRest> = log.values().map(rest).collect();
-    let Alone {
-        mut estimate,
-        squares,
-    } = Alone::new(&rests, &prior)?;
-    let birge = squares.0 / squares.1;
-    estimate.covariance *= birge / birge.max(1.0);
-    Some(estimate)
 }
 
 /// A Gauss–Newton step.
