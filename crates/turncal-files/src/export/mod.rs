@@ -39,6 +39,7 @@ pub struct Format {
     write: fn(&Values) -> Exported,
     /// Temperature dependence that the format omits; `None` for a calibration at one temperature.
     of_temperature: Option<&'static str>,
+    has_magnetometer: bool,
 }
 
 const fn row(
@@ -55,6 +56,7 @@ const fn row(
         axes,
         write,
         of_temperature: None,
+        has_magnetometer: false,
     }
 }
 
@@ -68,20 +70,22 @@ pub static FORMATS: [Format; 15] = [
     row("kalibr", "yaml", "IMU configuration for Kalibr, with the intrinsics of its model \
     scale-misalignment", Log, kalibr::kalibr),
     row("kf-gins", "yaml", "IMU section of a KF-GINS configuration", FrontRightDown, kf_gins::write),
-    row("c", "h", "A C99 header with constants and a function", RightFrontUp, code::write).with_temperature(""),
-    row("text", "txt", "All values with name, σ and unit", RightFrontUp, text::write),
+    row("c", "h", "A C99 header with constants and a function", RightFrontUp, code::write).with_temperature("").with_magnetometer(),
+    row("text", "txt", "All values with name, σ and unit", RightFrontUp, text::write).with_magnetometer(),
     row("px4", "params", "PX4 parameters: CAL_GYRO0, CAL_ACC0, CAL_MAG0", FrontRightDown, autopilot::px4)
-        .with_temperature(IN_AUTOPILOTS),
+        .with_temperature(IN_AUTOPILOTS).with_magnetometer(),
     row("ardupilot", "param", "ArduPilot parameters: INS_GYROFFS, INS_ACCOFFS, INS_ACCSCAL, COMPASS_", FrontRightDown,
-        autopilot::ardupilot).with_temperature(IN_AUTOPILOTS),
+        autopilot::ardupilot).with_temperature(IN_AUTOPILOTS).with_magnetometer(),
     row("open-vins-kalibr", "yaml", "IMU intrinsics for OpenVINS, with its model kalibr", Log, kalibr::open_vins_kalibr),
     row("open-vins-rpng", "yaml", "IMU intrinsics for OpenVINS, with its model rpng", Log, kalibr::open_vins_rpng),
     row("imu-calib", "yaml", "Accelerometer calibration for the ROS package imu_calib", Log, ros::imu_calib),
     row("ros-covariance", "yaml", "Covariances for ROS sensor_msgs/Imu, from the noise of a run", Log, ros::covariance),
-    row("imu-filter-madgwick", "yaml", "Magnetometer bias for the ROS package imu_filter_madgwick", Log, ros::madgwick),
-    row("mat", "mat", "A MATLAB structure (MAT file)", RightFrontUp, mat::write),
-    row("betaflight", "txt", "Accelerometer and magnetometer zeros for Betaflight", Log, autopilot::betaflight),
-    row("inav", "txt", "Zeros and gains for INAV", Log, autopilot::inav),
+    row("imu-filter-madgwick", "yaml", "Magnetometer bias for the ROS package imu_filter_madgwick", Log, ros::madgwick)
+        .with_magnetometer(),
+    row("mat", "mat", "A MATLAB structure (MAT file)", RightFrontUp, mat::write).with_magnetometer(),
+    row("betaflight", "txt", "Accelerometer and magnetometer zeros for Betaflight", Log, autopilot::betaflight)
+        .with_magnetometer(),
+    row("inav", "txt", "Zeros and gains for INAV", Log, autopilot::inav).with_magnetometer(),
     row("realsense", "bin", "IMU calibration table of a RealSense D400 camera, as written by rs-imu-calibration", Log,
         realsense::write),
 ];
@@ -95,6 +99,13 @@ impl Format {
     const fn with_temperature(self, omitted: &'static str) -> Self {
         Self {
             of_temperature: Some(omitted),
+            ..self
+        }
+    }
+
+    const fn with_magnetometer(self) -> Self {
+        Self {
+            has_magnetometer: true,
             ..self
         }
     }
@@ -123,6 +134,10 @@ pub fn write(
         };
         let omitted = Some(omitted).filter(|note| !note.is_empty());
         exported.notes.extend(omitted);
+    }
+    if record.mag.is_some() && !format.has_magnetometer {
+        let note = "magnetometer; its values are in calibration.json";
+        exported.notes.push(note.to_owned());
     }
     Ok(exported)
 }
