@@ -6,6 +6,7 @@ use crate::calibration::{
     OBSERVED_BELOW, PARAMETERS, ParameterMatrix, ParameterVector, from_vector, parameter, to_vector,
 };
 use crate::imu::{InstallationForm, PerSensor, Sensor, Triad};
+use crate::magnetic::MagneticVector;
 use crate::run::Run;
 use nalgebra::{DMatrix, DMatrixView};
 
@@ -18,6 +19,8 @@ pub struct Epoch {
     pub estimate: ParameterVector,
     /// 1σ of each.
     pub sigma: ParameterVector,
+    /// 1σ of the constants of the magnetometer, if there is one.
+    pub magnetic: Option<MagneticVector>,
 }
 
 /// Both triads with the covariance of their parameters.

@@ -52,7 +52,7 @@ pub use estimate::{Epoch, Estimate};
 pub use estimator::estimate;
 pub use leg::{Journey, Leg, Terms};
 pub use linearisation::{AttitudePrior, Linearisation};
-pub use magnetometer::{Ellipsoid, MagneticEstimate, MagneticPrior, ellipsoid};
+pub use magnetometer::{Ellipsoid, MagneticEstimate, MagneticMatrix, MagneticPrior, ellipsoid};
 pub use model::Model;
 pub use noise::{NoisePolicy, NoiseReport, NoiseTest, Source, SourceFigures};
 pub use options::Options;

@@ -16,9 +16,13 @@ mod unit;
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use crate::calibration::result::frame::{Canonical, free_parameters, own_nominal};
+use crate::calibration::result::frame::{
+    Canonical, MagneticValues, free_parameters, magnetic_in, own_nominal,
+};
+use crate::calibration::result::{Calibration, MagRecord};
 use crate::calibration::{Nees, nees};
 use crate::imu::{BodyFrame, Nominal, PerSensor};
+use crate::magnetic::MATRIX;
 use crate::statistics::median_of_axes;
 
 use joint::joint;
@@ -26,10 +30,13 @@ use limits::overall;
 use statistics::of_all;
 
 pub use limits::{Check, Limit, Specification, Verdict, checks, probability_outside};
-pub use quantity::{Quantity, Sample};
+pub use quantity::{Quantity, Sample, Shared};
 pub use scatter::{ChiSquare, Scatter, Spread};
 pub use statistics::{FALSE_ALARM, Statistics};
 pub use unit::{Calibrated, Row, Unit};
+
+/// Fields whose magnitudes differ by less than this many σ are one field; the Earth's field changes by less in a year.
+const SAME_FIELD: f64 = 0.1;
 
 /// The calibrations that are compared.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,9 +52,11 @@ pub struct Lot {
     pub nominal: PerSensor<Nominal>,
     /// Whether a run states nominal scales.
     pub nominal_is_stated: bool,
-    /// Relative 1σ of gravity, if all units were calibrated at one site and therefore have the gravity error in common.
-    /// This σ is part of each unit's σ and of the mean's σ, but not of the scatter.
-    pub shared_gravity: Option<f64>,
+    /// Relative 1σ of gravity and of the magnetic field, if all units were calibrated at one site and therefore have
+    /// their errors in common. These σ are part of each unit's σ and of the mean's σ, but not of the scatter.
+    pub shared: Shared,
+    /// Units of matrix and bias of the magnetometers that are compared.
+    pub magnetic_unit: Option<[String; 2]>,
     /// Every quantity that at least two units have.
     pub statistics: Vec<Statistics>,
     /// χ² of the scatter of all parameters with their correlations, over the units that give correlations; `None` if
@@ -83,17 +92,20 @@ impl Lot {
             row
         });
         let rows: Vec<Row> = rows.collect();
-        let shared_gravity = shared_gravity(&rows);
-        let gravity = shared_gravity.unwrap_or(0.0);
+        let shared = Shared {
+            gravity: shared_gravity(&rows),
+            field: shared_field(&rows),
+        };
         Self {
-            statistics: of_all(&rows, common.body_frame, gravity),
-            joint: joint_scatter(&rows, &parameters, gravity),
+            statistics: of_all(&rows, common.body_frame, shared),
+            joint: joint_scatter(&rows, &parameters, shared),
             rows,
             truth,
             body_frame: common.body_frame,
             nominal: common.nominal,
             nominal_is_stated: common.is_stated,
-            shared_gravity,
+            shared,
+            magnetic_unit: common.magnetic_unit,
             specification,
         }
     }
@@ -102,6 +114,13 @@ impl Lot {
     pub fn failures(&self) -> impl Iterator<Item = (&Unit, &str)> {
         let all = self.truth.iter().chain(&self.rows);
         all.filter_map(|row| Some((&row.unit, row.canonical.as_ref().err()?.as_str())))
+    }
+
+    /// Usable calibrations whose magnetometer is not compared although others have one, with the reason.
+    pub fn without_magnetometer(&self) -> impl Iterator<Item = (&Unit, &str)> {
+        let all = self.truth.iter().chain(&self.rows);
+        let usable = all.filter(|row| self.magnetic_unit.is_some() && row.canonical.is_ok());
+        usable.filter_map(|row| Some((&row.unit, *row.magnetic.as_ref().err()?)))
     }
 
     /// Quantities in which a unit, given by its index, is an outlier.
@@ -128,16 +147,18 @@ impl Lot {
     }
 
     /// The value of another unit minus the value of the reference, with its 1σ, assuming that the data of both are
-    /// independent except for gravity.
+    /// independent except for gravity and the magnetic field.
     pub fn difference(&self, row: &Row, quantity: Quantity) -> Option<Sample> {
         let reference = self.reference().filter(|from| !std::ptr::eq(*from, row));
         let (own, from) = (row.sample(quantity)?, reference?.sample(quantity)?);
         let is_exact = self.truth.is_some();
-        let shared = match self.shared_gravity {
-            Some(gravity) if !is_exact => quantity.shared(gravity),
-            _ => 0.0,
+        let shared = |of: Sample| self.shared.of(quantity, of.value);
+        let common = if is_exact {
+            0.0
+        } else {
+            shared(own) * shared(from)
         };
-        let variance = own.sigma.powi(2) + from.sigma.powi(2) - 2.0 * shared.powi(2);
+        let variance = own.sigma.powi(2) + from.sigma.powi(2) - 2.0 * common;
         let is_known = own.sigma > 0.0 && (is_exact || from.sigma > 0.0);
         Some(Sample {
             value: own.value - from.value,
@@ -157,6 +178,8 @@ struct Common {
     body_frame: BodyFrame,
     nominal: PerSensor<Nominal>,
     is_stated: bool,
+    /// Units of the first magnetometer.
+    magnetic_unit: Option<[String; 2]>,
 }
 
 impl Common {
@@ -179,7 +202,9 @@ impl Common {
             let own = own.as_ref().map(|own| *own.get(sensor));
             middle.or(own).unwrap_or(Nominal(Vector3::repeat(1.0)))
         });
+        let mut magnetometers = compared.iter().filter_map(|of| of.calibration.mag.as_ref());
         Self {
+            magnetic_unit: magnetometers.next().map(MagRecord::shown_units),
             output,
             body_frame: BodyFrame::common(frames),
             is_stated: !stated.is_empty(),
@@ -195,6 +220,7 @@ impl Common {
         });
         let calibrated = unit.calibrated.as_ref().ok();
         Row {
+            magnetic: self.magnetic(calibrated.map(|of| &of.calibration)),
             noise: calibrated.and_then(|of| of.noise_by(&self.nominal)),
             canonical,
             unit,
@@ -202,6 +228,19 @@ impl Common {
             checks: Vec::new(),
             verdict: None,
         }
+    }
+
+    fn magnetic(&self, record: Option<&Calibration>) -> Result<MagneticValues, &'static str> {
+        let record = record.ok_or("no calibration")?;
+        let mag = record.mag.as_ref().ok_or("no magnetometer")?;
+        if self.magnetic_unit != Some(mag.shown_units()) {
+            return Err("the magnetometer is in other units");
+        }
+        let (_, size) = mag.shown_field();
+        let mut of = magnetic_in(self.body_frame, (mag, record), &self.nominal);
+        let matrices = of.iter_mut().map(|of| of.rows_range_mut(..MATRIX));
+        matrices.for_each(|mut matrix| matrix *= size);
+        Ok(of)
     }
 }
 
@@ -234,6 +273,19 @@ fn shared_gravity(rows: &[Row]) -> Option<f64> {
     (same && first.sigma_m_s2 > 0.0).then(|| first.sigma_m_s2 / first.m_s2)
 }
 
+/// Relative 1σ of the magnitude of the field, if all units with a magnetometer were calibrated in the same field.
+fn shared_field(rows: &[Row]) -> Option<f64> {
+    let usable = rows.iter().filter(|row| row.magnetic.is_ok());
+    let fields = usable.filter_map(|row| {
+        let calibrated = row.unit.calibrated.as_ref().ok()?;
+        Some(&calibrated.calibration.mag.as_ref()?.field)
+    });
+    let mut all = fields.filter_map(|of| Some((of.magnitude, of.sigma?[0])));
+    let (magnitude, sigma) = all.next().filter(|(_, sigma)| *sigma > 0.0)?;
+    let same = all.all(|(of, _)| (of - magnitude).abs() < SAME_FIELD * sigma);
+    same.then(|| sigma / magnitude)
+}
+
 /// Consistency of the difference of a calibration from the truth with its covariance.
 fn nees_of(own: &Canonical, truth: &Canonical, parameters: &[usize]) -> Option<Nees> {
     // A truth without σ needs no correlations.
@@ -244,7 +296,7 @@ fn nees_of(own: &Canonical, truth: &Canonical, parameters: &[usize]) -> Option<N
 }
 
 /// χ² of the scatter of all parameters that every unit with correlations estimated.
-fn joint_scatter(rows: &[Row], parameters: &[usize], gravity: f64) -> Option<ChiSquare> {
+fn joint_scatter(rows: &[Row], parameters: &[usize], shared: Shared) -> Option<ChiSquare> {
     let usable = rows.iter().filter_map(|row| row.canonical.as_ref().ok());
     let all = usable.filter(|of| of.correlated);
     let all = all.filter_map(|of| Some((of.vector(), of.covariance?)));
@@ -252,7 +304,7 @@ fn joint_scatter(rows: &[Row], parameters: &[usize], gravity: f64) -> Option<Chi
     let estimated = |index: &usize| all.iter().all(|(_, p)| p[(*index, *index)] > 0.0);
     let indices: Vec<usize> = parameters.iter().copied().filter(estimated).collect();
     let n = indices.len();
-    let shared = |i: usize| Quantity::Parameter(indices[i]).shared(gravity);
+    let shared = |i: usize| shared.of(Quantity::Parameter(indices[i]), 1.0);
     joint(all.iter().map(|(vector, covariance)| {
         let vector = DVector::from_fn(n, |i, _| vector[indices[i]]);
         let own = |i, j| covariance[(indices[i], indices[j])] - shared(i) * shared(j);

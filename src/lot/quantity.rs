@@ -3,6 +3,7 @@
 use crate::calibration::result::frame::free_parameters;
 use crate::calibration::{AUXILIARY, auxiliary_name, parameter_name, sensor_and_parameter};
 use crate::imu::{AXES, BodyFrame, InstallationForm, ParameterKind, Sensor, Triad};
+use crate::magnetic::{MAGNETOMETER, MATRIX, MagneticTriad};
 
 /// All axes of both triads.
 pub fn axes() -> impl Iterator<Item = (Sensor, usize)> {
@@ -19,6 +20,34 @@ pub enum Quantity {
     Auxiliary(usize),
     /// White-noise density of an axis at rest.
     Noise(Sensor, usize),
+    /// An entry of the matrix or of the bias of the magnetometer, in the file's quantity.
+    Magnetic(usize),
+}
+
+/// Relative 1σ of the errors that all calibrations of a site have in common.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Shared {
+    /// Of gravity; `None` if the calibrations are not from one site.
+    pub gravity: Option<f64>,
+    /// Of the magnitude of the magnetic field; `None` if the calibrations are not from one site.
+    pub field: Option<f64>,
+}
+
+impl Shared {
+    /// The 1σ that all calibrations share in a quantity of this value, with the sign of the change of the value.
+    pub fn of(&self, quantity: Quantity, value: f64) -> f64 {
+        let of = match quantity {
+            Quantity::Parameter(index) if follows_gravity(index) => self.gravity,
+            Quantity::Magnetic(k) if k < MATRIX => self.field.map(|of| of * value),
+            _ => None,
+        };
+        of.unwrap_or(0.0)
+    }
+}
+
+fn follows_gravity(index: usize) -> bool {
+    let (sensor, of_triad) = sensor_and_parameter(index);
+    sensor == Sensor::Accel && Triad::kind(of_triad) == ParameterKind::Scale
 }
 
 impl Quantity {
@@ -29,18 +58,7 @@ impl Quantity {
         parameters
             .chain((0..AUXILIARY).map(Self::Auxiliary))
             .chain(noise)
-    }
-
-    /// The 1σ that all calibrations share if they have this relative 1σ of gravity in common.
-    pub fn shared(self, gravity: f64) -> f64 {
-        let follows_gravity = |index| {
-            let (sensor, of_triad) = sensor_and_parameter(index);
-            sensor == Sensor::Accel && Triad::kind(of_triad) == ParameterKind::Scale
-        };
-        match self {
-            Self::Parameter(index) if follows_gravity(index) => gravity,
-            _ => 0.0,
-        }
+            .chain((0..MAGNETOMETER).map(Self::Magnetic))
     }
 
     /// Name in files, such as `gyro.scale.x` or `gyro.noise.x`.
@@ -51,6 +69,7 @@ impl Quantity {
             }
             Self::Auxiliary(index) => auxiliary_name(index).unwrap_or_default(),
             Self::Noise(sensor, axis) => format!("{}.noise.{}", sensor.name(), AXES[axis]),
+            Self::Magnetic(constant) => MagneticTriad::name(constant),
         }
     }
 }

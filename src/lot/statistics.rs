@@ -1,6 +1,6 @@
 //! Statistics of each quantity over all units.
 
-use super::quantity::{Quantity, Sample};
+use super::quantity::{Quantity, Sample, Shared};
 use super::scatter::{Scatter, outliers, scatter};
 use super::unit::Row;
 use crate::imu::BodyFrame;
@@ -36,17 +36,15 @@ impl Statistics {
 /// Values of one quantity with their variances, each with the index of its unit.
 type Samples = Vec<(usize, (f64, f64))>;
 
-/// Statistics of every quantity that at least two units have. `gravity` is the shared relative 1σ of gravity.
-pub fn of_all(rows: &[Row], body_frame: BodyFrame, gravity: f64) -> Vec<Statistics> {
-    let quantities = Quantity::all(body_frame).map(|quantity| {
-        let shared = quantity.shared(gravity);
-        (quantity, shared, samples(rows, quantity, shared))
-    });
-    let quantities: Vec<(Quantity, f64, Samples)> = quantities
-        .filter(|(.., samples)| samples.len() > 1)
+/// Statistics of every quantity that at least two units have.
+pub fn of_all(rows: &[Row], body_frame: BodyFrame, shared: Shared) -> Vec<Statistics> {
+    let quantities =
+        Quantity::all(body_frame).map(|quantity| (quantity, samples(rows, quantity, shared)));
+    let quantities: Vec<(Quantity, Samples)> = quantities
+        .filter(|(_, samples)| samples.len() > 1)
         .collect();
     let alarm = FALSE_ALARM / quantities.len() as f64;
-    let of = |(quantity, shared, samples): (Quantity, f64, Samples)| {
+    let of = |(quantity, samples): (Quantity, Samples)| {
         let values = |of: &Samples| -> Vec<(f64, f64)> { of.iter().map(|of| of.1).collect() };
         let all = values(&samples);
         let apart = outliers(&all, &scatter(&all)?, alarm);
@@ -54,7 +52,8 @@ pub fn of_all(rows: &[Row], body_frame: BodyFrame, gravity: f64) -> Vec<Statisti
         let count = samples.len();
         let rest = samples.into_iter().filter(|of| !apart.contains(&of.0));
         let mut scatter = scatter(&values(&rest.collect()))?;
-        scatter.mean_sigma = scatter.mean_sigma.hypot(shared);
+        let of_mean = shared.of(quantity, scatter.mean);
+        scatter.mean_sigma = scatter.mean_sigma.hypot(of_mean);
         Some(Statistics {
             quantity,
             count,
@@ -66,7 +65,7 @@ pub fn of_all(rows: &[Row], body_frame: BodyFrame, gravity: f64) -> Vec<Statisti
     quantities.into_iter().filter_map(of).collect()
 }
 
-fn samples(rows: &[Row], quantity: Quantity, shared: f64) -> Samples {
+fn samples(rows: &[Row], quantity: Quantity, shared: Shared) -> Samples {
     let all = rows.iter().enumerate();
     let all = all.filter_map(|(place, row)| Some((place, row.sample(quantity)?)));
     let mut all: Vec<(usize, Sample)> = all.collect();
@@ -74,8 +73,8 @@ fn samples(rows: &[Row], quantity: Quantity, shared: f64) -> Samples {
     if all.iter().filter(|of| stated(of)).count() > 1 {
         all.retain(stated);
     }
-    let own = |sigma: f64| (sigma * sigma - shared * shared).max(0.0);
+    let own = |of: Sample| (of.sigma.powi(2) - shared.of(quantity, of.value).powi(2)).max(0.0);
     { all.into_iter() }
-        .map(|(place, Sample { value, sigma })| (place, (value, own(sigma))))
+        .map(|(place, of)| (place, (of.value, own(of))))
         .collect()
 }

@@ -149,7 +149,7 @@ fn an_error_of_gravity_that_all_share_is_in_their_mean_and_not_in_their_scatter(
         shared: 30.0 * PPM,
     };
     let found = Lot::new(drawn(50, draw, 3), None, None);
-    assert!((found.shared_gravity.unwrap() / PPM - 30.0).abs() < 1e-9);
+    assert!((found.shared.gravity.unwrap() / PPM - 30.0).abs() < 1e-9);
     let accel = of(&found, "accel.scale.x").scatter;
     // χ² of 49 degrees of freedom: 1 ± 0.2 each; with the shared part it would be 0.06.
     let ratio = accel.chi_square.unwrap().value / 49.0;

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::limits::{Check, Verdict};
 use super::quantity::{Quantity, Sample, axes};
 use crate::calibration::result::Calibration;
-use crate::calibration::result::frame::Canonical;
+use crate::calibration::result::frame::{Canonical, MagneticValues};
 use crate::calibration::{Nees, auxiliary_name};
 use crate::imu::{Nominal, PerSensor};
 use crate::noise::RestNoise;
@@ -69,6 +69,9 @@ pub struct Row {
     pub unit: Unit,
     /// Calibration in the common form, or the reason why it cannot be used.
     pub canonical: Result<Canonical, String>,
+    /// Matrix and bias of the magnetometer in the common body frame, in the file's quantity (per µT if the field is in
+    /// T), or the reason why they are not compared.
+    pub magnetic: Result<MagneticValues, &'static str>,
     /// Noise at rest, normalised by the common nominal scales; `None` if it is not known.
     pub noise: Option<RestNoise>,
     /// Consistency of the difference from the truth with the covariance; `None` without a truth or without
@@ -109,6 +112,10 @@ impl Row {
                 let noise = self.noise.as_ref()?;
                 let value = noise.density.get(sensor)[axis];
                 let sigma = value * noise.relative_sigma();
+                Some(Sample { value, sigma })
+            }
+            Quantity::Magnetic(constant) => {
+                let [value, sigma] = self.magnetic.as_ref().ok()?.map(|of| of[constant]);
                 Some(Sample { value, sigma })
             }
         }

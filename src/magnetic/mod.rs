@@ -9,4 +9,4 @@ mod field;
 mod triad;
 
 pub use field::LocalField;
-pub use triad::{MAGNETIC, MagneticResponse, MagneticTriad, MagneticVector};
+pub use triad::{MAGNETIC, MAGNETOMETER, MATRIX, MagneticResponse, MagneticTriad, MagneticVector};

@@ -10,8 +10,13 @@ pub const MAGNETIC: usize = 14;
 /// The constants of a magnetometer and its field, in order.
 pub type MagneticVector = SVector<f64, MAGNETIC>;
 
-const BIAS: usize = 9;
-const FIELD: usize = 12;
+/// Number of constants of the magnetometer alone: matrix and bias.
+pub const MAGNETOMETER: usize = 12;
+/// Number of entries of the matrix, which are the first constants.
+pub const MATRIX: usize = 9;
+
+const BIAS: usize = MATRIX;
+const FIELD: usize = MAGNETOMETER;
 
 /// A magnetometer in a constant field.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -5,12 +5,13 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{DMatrix, Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::Survey;
 use super::attained::Attained;
+use super::field::{AfterMove, FieldDirections};
 use crate::attitude::level;
 use crate::calibration::{Bound, Options, Problem, bound};
 use crate::imu::{InstallationForm, MotionNoise, NoiseSource, PerSensor, Sensor, TermVector};
@@ -111,69 +112,87 @@ impl Advisor {
         Move::Up(farthest.unwrap_or(Vector3::z()))
     }
 
-    /// The move that reduces the σ most, starting from the attitude in which this direction along body axes points up.
+    /// The move that reduces the σ most, starting from the last dwell, and whether the magnetometer alone asks for it.
     /// With a specification, only the σ that are too large for it count; without a specification, all σ count.
     pub fn next(
         &mut self,
-        run: &Run,
-        up: &Vector3<f64>,
+        (run, survey): (&Run, &Survey),
         attained: &Attained,
         specification: Option<&Specification>,
-    ) -> Option<Move> {
+    ) -> Option<(Move, bool)> {
         let known = information(&attained.bound)?;
-        let from = nearest_attitude(up);
+        let up = survey
+            .rests
+            .last()
+            .map_or(Vector3::z(), |rest| rest.force.normalize());
+        let from = nearest_attitude(&up);
+        // A specification has no limits for magnetometers.
+        let field = match specification {
+            None => FieldDirections::new((run, survey), &attained.bound),
+            Some(_) => None,
+        };
         let moves = self
             .from
             .entry(from)
             .or_insert_with(|| worth(run, &up_in(from)));
-        let missing = |(_, gained): &(Move, DMatrix<f64>)| -> f64 {
-            let all = &known + gained;
-            let Some(covariance) = all.cholesky().map(|root| root.inverse()) else {
-                return f64::INFINITY;
-            };
-            let sigma = covariance.diagonal().map(f64::sqrt);
-            missing(attained, sigma.as_slice(), specification)
+        let missing = moves.iter().map(|(of, gained)| {
+            let covariance = (&known + gained).cholesky().map(|root| root.inverse());
+            let of_triads = covariance.map_or(f64::INFINITY, |covariance| {
+                missing(
+                    attained,
+                    &covariance.diagonal().map(f64::sqrt),
+                    specification,
+                )
+            });
+            let after = field.as_ref().map(|field| field.after(of.rotation()));
+            (*of, of_triads, after.unwrap_or_default())
+        });
+        let missing: Vec<(Move, f64, AfterMove)> = missing.collect();
+        let best = |weight: f64| {
+            let sum = |of: &(Move, f64, AfterMove)| of.1 + weight * of.2.log_sigma;
+            missing.iter().min_by(|a, b| sum(a).total_cmp(&sum(b)))
         };
-        let best = moves
-            .iter()
-            .min_by(|a, b| missing(a).total_cmp(&missing(b)));
-        best.map(|(best, _)| *best)
+        let (best, of_triads) = (best(1.0)?, best(0.0)?);
+        Some((best.0, best.2.is_lacking && best.0 != of_triads.0))
     }
 }
 
 /// Sum of the log σ. With a specification, relative to the required σ, for σ that are larger; without one, of all σ in
 /// units of their prior.
-fn missing(attained: &Attained, sigma: &[f64], specification: Option<&Specification>) -> f64 {
+fn missing(
+    attained: &Attained,
+    sigma: &DVector<f64>,
+    specification: Option<&Specification>,
+) -> f64 {
     let Attained {
         bound,
         inflation,
         checks,
         ..
     } = attained;
-    let estimated: Vec<usize> = bound.estimate.estimated().collect();
     let Some(specification) = specification else {
         return sigma.iter().map(|sigma| sigma.ln()).sum();
     };
     let over = |check: &Check| {
         let parameter = check.limit.parameter;
-        let k = estimated.iter().position(|&k| k == parameter)?;
-        let expected = sigma[k] * bound.prior_sigma[parameter] * inflation[parameter];
+        let expected = sigma[parameter] * bound.prior_sigma[parameter] * inflation[parameter];
         let needed = specification.deciding_sigma(check.limit.within);
-        Some((expected / needed).ln().max(0.0))
+        (expected / needed).ln().max(0.0)
     };
     let open = checks.iter().filter(|check| check.verdict != Verdict::Pass);
-    open.filter_map(over).sum()
+    open.map(over).sum()
 }
 
-/// Information on the estimated parameters in units of their prior σ, with that of the prior.
+/// Information on the parameters in units of their prior σ, with that of the prior. Parameters that are not estimated
+/// have no other, so records that estimate different parameters can be combined.
 fn information(bound: &Bound) -> Option<DMatrix<f64>> {
-    let estimated: Vec<usize> = bound.estimate.estimated().collect();
-    let n = estimated.len();
     let prior = &bound.prior_sigma;
-    let covariance = DMatrix::from_fn(n, n, |i, j| {
-        let (i, j) = (estimated[i], estimated[j]);
-        bound.estimate.covariance[(i, j)] / (prior[i] * prior[j])
-    });
+    let mut covariance = DMatrix::identity(prior.len(), prior.len());
+    for i in bound.estimate.estimated() {
+        for j in bound.estimate.estimated() {
+            covariance[(i, j)] = bound.estimate.covariance[(i, j)] / (prior[i] * prior[j]);
+        }
+    }
     Some(covariance.cholesky()?.inverse())
 }
 

@@ -11,12 +11,23 @@ pub struct Attained {
     pub bound: Bound,
     /// Expected σ divided by the σ of the bound.
     pub inflation: ParameterVector,
-    /// For each dwell: the time of its end in s, and the expected σ at that time.
-    pub history: Vec<(f64, GroupSigma)>,
+    /// Expected σ at the end of each dwell.
+    pub history: Vec<Reached>,
     /// Parameters that keep more than half of their prior σ.
     pub unobserved: Vec<String>,
     /// Check of every limit of the specification, for a unit at its nominal values.
     pub checks: Vec<Check>,
+}
+
+/// Expected σ at the end of a dwell.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reached {
+    /// Time, s.
+    pub time: f64,
+    /// σ of each group of parameters.
+    pub sigma: GroupSigma,
+    /// RMS σ of matrix and bias of the magnetometer with their units, if the rows so far determine it.
+    pub magnetic: Option<[(f64, String); 2]>,
 }
 
 impl Attained {

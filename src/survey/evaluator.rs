@@ -1,15 +1,17 @@
 //! Accuracy of a recording in progress, and the next move.
 
-use nalgebra::Vector3;
+use nalgebra::SVector;
 
 use super::advice::{Advisor, Move};
-use super::attained::{Attained, are_decided, decided};
+use super::attained::{Attained, Reached, are_decided, decided};
 use super::{Survey, bound_of_record, by_group, unobserved};
+use crate::calibration::result::MagRecord;
 use crate::calibration::{
-    Bound, CalibrationError, Estimate, Finding, Method, Options, ParameterVector, Problem,
-    Progress, Verdict, Word,
+    Bound, CalibrationError, Finding, MagneticEstimate, MagneticMatrix, Method, Options,
+    ParameterVector, Problem, Progress, Verdict, Word,
 };
 use crate::lot::{self, Specification};
+use crate::magnetic::MagneticVector;
 use crate::run::Run;
 
 /// A recording is calibrated again after it has grown by this factor. Together, all calibrations then take at most
@@ -33,6 +35,8 @@ pub struct Status {
     pub calibrated: Option<InterimCalibration>,
     /// The next move; `None` if no further move is needed.
     pub next: Option<Move>,
+    /// Whether this move is recommended because the magnetometer lacks its attitude.
+    pub is_for_magnetometer: bool,
 }
 
 /// A calibration of the rows so far. Only a calibration shows the actual noise, unmodelled errors, and the resulting σ.
@@ -46,8 +50,8 @@ pub struct InterimCalibration {
     pub findings: Vec<Finding>,
     /// Whether a specification is given and the σ are small enough to decide every limit.
     pub is_met: bool,
-    /// σ relative to those of the bound.
-    inflation: ParameterVector,
+    /// σ relative to those of the bound: parameters, and constants of the magnetometer.
+    inflation: (ParameterVector, MagneticVector),
 }
 
 /// Evaluates a recording repeatedly while it grows.
@@ -94,16 +98,16 @@ impl Evaluator {
         let last = survey.rests.last();
         let standing = last.filter(|rest| rest.dwell.samples.end == imu.len());
         let still = standing.map_or(0.0, |rest| rest.dwell.duration(imu));
-        let up = last.map_or(Vector3::z(), |rest| rest.force.normalize());
         let expected = bound_of_record(run, &self.options);
         let expected = expected.map(|bound| self.of_bound(run, &survey, bound));
         let calibrated = self.calibrated.clone();
         let next = match &expected {
             _ if calibrated.as_ref().is_some_and(|of| of.is_met) => None,
-            Ok(attained) => self
-                .advisor
-                .next(run, &up, attained, self.specification.as_ref()),
-            Err(_) => Some(self.advisor.first(&survey)),
+            Ok(attained) => {
+                self.advisor
+                    .next((run, &survey), attained, self.specification.as_ref())
+            }
+            Err(_) => Some((self.advisor.first(&survey), false)),
         };
         Status {
             duration: imu.duration(),
@@ -111,7 +115,8 @@ impl Evaluator {
             still,
             expected,
             calibrated,
-            next,
+            next: next.map(|(next, _)| next),
+            is_for_magnetometer: next.is_some_and(|(_, is_for_magnetometer)| is_for_magnetometer),
         }
     }
 
@@ -128,7 +133,7 @@ impl Evaluator {
             run: run.clone(),
             options: self.options.clone(),
             specification: self.specification.clone(),
-            bound: attained.bound.estimate.clone(),
+            bound: attained.bound.clone(),
         })
     }
 
@@ -139,16 +144,20 @@ impl Evaluator {
 
     fn of_bound(&self, run: &Run, survey: &Survey, bound: Bound) -> Attained {
         let estimate = &bound.estimate;
-        let inflation = match &self.calibrated {
-            Some(of) => of.inflation,
-            None => ParameterVector::repeat(1.0),
-        };
+        let one = (ParameterVector::repeat(1.0), MagneticVector::repeat(1.0));
+        let calibrated = self.calibrated.as_ref();
+        let (inflation, of_magnetometer) = calibrated.map_or(one, |of| of.inflation);
         let ends = survey.rests.iter().map(|rest| rest.dwell.times(run)[1]);
         let history = ends.filter_map(|end| {
             let mut epochs = bound.history.iter();
             let at_end = epochs.rfind(|epoch| epoch.time <= end + 0.5 * EPOCH)?;
             let sigma = at_end.sigma.component_mul(&inflation);
-            Some((end, by_group(&sigma, estimate)))
+            let magnetic = at_end.magnetic.map(|of| of.component_mul(&of_magnetometer));
+            Some(Reached {
+                time: end,
+                sigma: by_group(&sigma, estimate),
+                magnetic: magnetic.and_then(|sigma| shown(run, &bound, &sigma)),
+            })
         });
         let history = history.collect();
         let mut inflated = estimate.clone();
@@ -176,13 +185,29 @@ impl Evaluator {
     }
 }
 
+/// RMS σ of matrix and bias in the quantity of the log, if the output depends on the field.
+fn shown(run: &Run, bound: &Bound, sigma: &MagneticVector) -> Option<[(f64, String); 2]> {
+    let mut estimate = bound.magnetic.clone().filter(MagneticEstimate::is_shown)?;
+    estimate.covariance = MagneticMatrix::from_diagonal(&sigma.component_mul(sigma));
+    let log = run.recording.magnetometer.as_ref()?;
+    MagRecord::of_estimate(&estimate, log)?.shown_sigma()
+}
+
+/// Found σ divided by expected σ; one if either is not known.
+fn ratio<const N: usize>(found: &SVector<f64, N>, expected: &SVector<f64, N>) -> SVector<f64, N> {
+    found.zip_map(expected, |found, expected| {
+        let is_known = found > 0.0 && expected > 0.0;
+        if is_known { found / expected } else { 1.0 }
+    })
+}
+
 /// Rows to calibrate, possibly in another thread.
 #[derive(Debug)]
 pub struct Due {
     run: Run,
     options: Options,
     specification: Option<Specification>,
-    bound: Estimate,
+    bound: Bound,
 }
 
 impl Due {
@@ -192,7 +217,9 @@ impl Due {
         let solution = problem.solve(Method::Ekf, progress).ok()?;
         let findings = solution.findings().to_vec();
         let verdict = Verdict::of(&findings);
-        let [found, expected] = [solution.estimate(), &self.bound].map(Estimate::sigma);
+        let found = solution.outcome().and_then(|of| of.magnetic.as_ref());
+        let [found, expected] = [found, self.bound.magnetic.as_ref()]
+            .map(|of| of.map(MagneticEstimate::sigma).unwrap_or_default());
         let is_met = verdict.word != Word::Failed
             && self.specification.as_ref().is_some_and(|specification| {
                 are_decided(&decided(specification, solution.estimate()))
@@ -202,13 +229,10 @@ impl Due {
             verdict,
             findings,
             is_met,
-            inflation: found.zip_map(&expected, |found, expected| {
-                if expected > 0.0 {
-                    found / expected
-                } else {
-                    1.0
-                }
-            }),
+            inflation: (
+                ratio(&solution.estimate().sigma(), &self.bound.estimate.sigma()),
+                ratio(&found, &expected),
+            ),
         })
     }
 }

@@ -4,10 +4,11 @@
 mod advice;
 mod attained;
 mod evaluator;
+mod field;
 mod session;
 
 pub use advice::{Attitude, Move, nearest_attitude};
-pub use attained::{Attained, decided, needed};
+pub use attained::{Attained, Reached, decided, needed};
 pub use evaluator::{Due, Evaluator, GROWTH, InterimCalibration, Status};
 pub use session::Session;
 

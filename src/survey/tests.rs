@@ -300,7 +300,7 @@ mod by_hand {
         let mut run = person.run();
         run.instrument.noise.gyro.random_walk /= 5.0;
         let status = Evaluator::default().status(&run, UNWATCHED);
-        let (_, shown) = status.expected.unwrap().history.pop().unwrap();
+        let shown = status.expected.unwrap().history.pop().unwrap().sigma;
 
         let problem = Problem::new(&run, &Options::default());
         let solution = problem.solve(Method::Ekf, UNWATCHED).unwrap();

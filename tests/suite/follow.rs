@@ -1,5 +1,6 @@
 //! `turncal calibrate --follow`: rows are evaluated as they arrive, kept, and finally calibrated.
 
+use std::f64::consts::PI;
 use std::fs::{self, OpenOptions};
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
@@ -8,9 +9,15 @@ use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use nalgebra::{SMatrix, Vector3};
+use turncal::calibration::{Method, Options, Problem, UNWATCHED};
 use turncal::imu::Output as Quantity;
 use turncal::models::path_by_hand;
+use turncal::recording::Magnetometer;
+use turncal::run::{Run, motion};
 use turncal::simulation::Scenario;
+use turncal::survey::{Evaluator, Move, Status};
+use turncal::turntable::{BodyStep, Moves, Rotation};
 use turncal_files::write_run;
 
 use crate::shared::shared;
@@ -220,6 +227,152 @@ fn what_keeps_rows_from_being_read_is_told_while_they_come() {
     let told = text(&output);
     assert!(told.contains("not yet: "), "{told}");
     assert_eq!(fs::read(directory.path().join("kept.csv")).unwrap(), noise);
+}
+
+/// A sensor with a magnetometer that is turned by hand along the path and then makes these moves; the magnetometer has
+/// values only in some dwells.
+fn with_magnetometer(moves: &[Move], has_values: impl Fn(usize, usize) -> bool) -> Run {
+    let mut scenario = Scenario::load("nine-axis").unwrap();
+    scenario.path = path_by_hand(PATH).unwrap();
+    let step = |of: &Move| BodyStep {
+        rotation: match *of {
+            Move::Up(axis) => Rotation::Point {
+                axis,
+                along: Vector3::z(),
+            },
+            Move::HalfTurn { axis, is_negative } => {
+                let angle = if is_negative { -PI } else { PI };
+                Rotation::By(Vector3::ith(axis, angle))
+            }
+        },
+        duration: 5.5,
+        acceleration: PI / 2.0,
+        dwell: 6.0,
+    };
+    if let Moves::Body { steps, .. } = &mut scenario.path.moves {
+        steps.extend(moves.iter().map(step));
+    }
+    let mut run = scenario.simulate(5, 0).unwrap().run;
+    run.recording.table = None;
+    let rests = motion::rests(&run);
+    let times = rests.iter().map(|rest| rest.dwell.times(&run));
+    let times: Vec<[f64; 2]> = times.collect();
+    let log = run.recording.magnetometer.take().unwrap();
+    let mut seen = Magnetometer::new(&log.unit, log.nominal);
+    seen.field = log.field;
+    for (time, value) in log.values() {
+        let is_in = |&(_, [start, end]): &(usize, &[f64; 2])| (*start..*end).contains(&time);
+        let dwell = times.iter().enumerate().find(is_in);
+        if dwell.is_none_or(|(dwell, _)| has_values(dwell, times.len())) {
+            seen.push(time, value);
+        }
+    }
+    run.recording.magnetometer = Some(seen);
+    run
+}
+
+/// σ of matrix and hard iron after the last dwell.
+fn magnetic_sigma(status: &Status) -> [f64; 2] {
+    let last = status.expected.as_ref().unwrap().history.last().unwrap();
+    last.magnetic.as_ref().unwrap().each_ref().map(|of| of.0)
+}
+
+/// 1σ of the output in the direction of the field along body axes for which it is largest, T.
+fn worst_direction(status: &Status) -> f64 {
+    let of = status.expected.as_ref().unwrap().bound.magnetic.as_ref();
+    let covariance = of.unwrap().covariance.fixed_view::<12, 12>(0, 0);
+    let variance = |along: Vector3<f64>| {
+        let mut rows = SMatrix::<f64, 3, 12>::zeros();
+        for axis in 0..3 {
+            rows.fixed_view_mut::<1, 3>(axis, 3 * axis)
+                .copy_from(&along.transpose());
+            rows[(axis, 9 + axis)] = 1.0;
+        }
+        (rows * covariance * rows.transpose()).trace()
+    };
+    let directions = Move::all().filter_map(|of| match of {
+        Move::Up(along) => Some(variance(along)),
+        Move::HalfTurn { .. } => None,
+    });
+    directions.fold(0.0, f64::max).sqrt()
+}
+
+#[test]
+fn the_live_sigma_of_a_magnetometer_are_those_of_the_calibration_of_the_same_rows() {
+    let run = with_magnetometer(&[], |_, _| true);
+    let mut evaluator = Evaluator::default();
+    let live = magnetic_sigma(&evaluator.status(&run, UNWATCHED));
+    let problem = Problem::new(&run, &Options::default());
+    let solution = problem.solve(Method::Ekf, UNWATCHED).unwrap();
+    let assessment = solution.assess(&problem).unwrap();
+    let mag = solution.calibration(&problem, &assessment).mag.unwrap();
+    for (live, (offline, unit)) in live.into_iter().zip(mag.shown_sigma().unwrap()) {
+        assert!(
+            (live / offline - 1.0).abs() < 0.02,
+            "{live} {offline} {unit}"
+        );
+    }
+}
+
+#[test]
+fn rows_of_a_run_with_a_table_are_followed_too() {
+    let run = Scenario::load("nine-axis")
+        .unwrap()
+        .simulate(1, 0)
+        .unwrap()
+        .run;
+    let status = Evaluator::default().outlook(&run);
+    assert!(
+        status.expected.is_ok() && status.next.is_some(),
+        "{status:?}"
+    );
+}
+
+#[test]
+fn the_attitude_that_only_the_magnetometer_lacks_is_asked_for_with_the_reason() {
+    let outlook = |run: &Run| Evaluator::default().outlook(run);
+    // Gyros and accelerometers see all faces and edges; the magnetometer only some, y down not among them.
+    let mut moves: Vec<Move> = Move::all().take(18).collect();
+    let whole = outlook(&with_magnetometer(&moves, |_, _| true));
+    assert!(!whole.is_for_magnetometer, "{:?}", whole.next);
+    let is_seen = |dwell: usize, dwells: usize| dwell < 6 || dwell + 1 == dwells;
+    let run = with_magnetometer(&moves, is_seen);
+    let lacking = outlook(&run);
+    assert!(lacking.is_for_magnetometer, "{:?}", lacking.next);
+    let next = lacking.next.unwrap();
+    moves.push(next);
+    let seen_before = |dwell: usize, dwells: usize| is_seen(dwell, dwells) || dwell + 2 == dwells;
+    let followed = outlook(&with_magnetometer(&moves, seen_before));
+    let (before, after) = (worst_direction(&lacking), worst_direction(&followed));
+    assert!(after < 0.8 * before, "{next:?}: {before} {after}");
+    let text = turncal_report::session::screen(&run, &lacking, None);
+    assert!(
+        text.last()
+            .unwrap()
+            .ends_with("; the magnetometer lacks this attitude"),
+        "{text:?}"
+    );
+    assert!(
+        text.iter().any(|line| line.starts_with("mag hard iron")),
+        "{text:?}"
+    );
+}
+
+#[test]
+fn rows_with_a_magnetometer_are_followed_with_its_sigma_and_calibrated_as_the_file_of_them() {
+    let directory = tempfile::tempdir().unwrap();
+    let run = with_magnetometer(&[], |_, _| true);
+    write_run(directory.path(), &run, Quantity::Rate, None).unwrap();
+    let packed = fs::File::open(directory.path().join("imu.csv.gz")).unwrap();
+    let rows = std::io::read_to_string(flate2::read::GzDecoder::new(packed)).unwrap();
+    let arguments = ["--keep", "kept.csv", "--json"];
+    let (told, is_success) = followed(directory.path(), &arguments, rows.as_bytes());
+    assert!(is_success && told.contains("mag matrix 0."), "{told}");
+    let offline = String::from_utf8(offline(directory.path(), "kept.csv")).unwrap();
+    assert!(
+        told.contains(&offline) && offline.contains("mag.matrix.xy"),
+        "{told}"
+    );
 }
 
 /// What following gives if this is its whole input, and whether it succeeded.

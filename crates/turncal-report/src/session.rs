@@ -10,11 +10,13 @@ use turncal::lot;
 use turncal::lot::Specification;
 use turncal::run::Run;
 use turncal::survey::{
-    Attained, Attitude, InterimCalibration, Move, Status, nearest_attitude, needed,
+    Attained, Attitude, InterimCalibration, Move, Reached, Status, nearest_attitude, needed,
 };
 
 /// Minimum turn about a body axis that counts, rad.
 const TURNED: f64 = 60.0 * DEGREE;
+/// Values of a magnetometer.
+const MAGNETIC: [&str; 2] = ["mag matrix", "mag hard iron"];
 /// Maximum number of findings on a screen.
 const SHOWN: usize = 3;
 
@@ -50,12 +52,24 @@ pub fn words(next: Move) -> String {
     }
 }
 
+/// The reason for the recommended move, after its words, if it is the magnetometer.
+pub fn reason(status: &Status) -> &'static str {
+    if status.is_for_magnetometer {
+        "; the magnetometer lacks this attitude"
+    } else {
+        ""
+    }
+}
+
 /// The screen, with at most 80 columns; the state comes first and the next move last.
 pub fn screen(run: &Run, status: &Status, specification: Option<&Specification>) -> Vec<String> {
     let mut lines = vec![so_far(status), String::new()];
     match &status.expected {
         Err(error) => lines.push(format!("no calibration yet: {error}")),
-        Ok(attained) => lines.extend(groups(attained, specification)),
+        Ok(attained) => {
+            lines.extend(groups(attained, specification));
+            lines.extend(magnetometer(run, attained.history.last()));
+        }
     }
     lines.extend(status.calibrated.as_ref().map(calibrated));
     lines.push(String::new());
@@ -70,7 +84,11 @@ pub fn screen(run: &Run, status: &Status, specification: Option<&Specification>)
         lines.push(format!("about {} left", duration(left)));
     }
     lines.push(match status.next {
-        Some(next) => format!("next: {}, then keep still for 5 s", words(next)),
+        Some(next) => format!(
+            "next: {}, then keep still for 5 s{}",
+            words(next),
+            reason(status)
+        ),
         None => {
             "the σ of the calibration are small enough to decide every limit of the specification"
                 .to_owned()
@@ -98,15 +116,18 @@ pub fn line(status: &Status, dwell: usize) -> Option<String> {
         .len()
         .checked_sub(behind)
         .map(|k| &attained.history[k]);
-    if let Some((time, groups)) = of_dwell {
-        let sigma = groups.iter().filter_map(|(group, sigma)| {
+    if let Some(reached) = of_dwell {
+        let sigma = reached.sigma.iter().filter_map(|(group, sigma)| {
             let sigma = three_digits((*sigma)? / group.unit_value());
             Some(format!("{} {sigma} {}", group.short(), group.unit()))
         });
+        let magnetic = reached.magnetic.iter().flatten().zip(MAGNETIC);
+        let magnetic =
+            magnetic.map(|((sigma, unit), name)| format!("{name} {} {unit}", three_digits(*sigma)));
         line += &format!(
             "; {} s; 1σ {}",
-            value(*time, 1.0),
-            sigma.collect::<Vec<_>>().join(", ")
+            value(reached.time, 1.0),
+            sigma.chain(magnetic).collect::<Vec<_>>().join(", ")
         );
     }
     Some(line)
@@ -157,10 +178,27 @@ fn groups(attained: &Attained, specification: Option<&Specification>) -> Vec<Str
     };
     let heading = format!("{:<24}{:>14}{asked:>14}", "", "expected 1σ");
     let last = attained.history.last();
-    let rows = last.into_iter().flat_map(|(_, groups)| groups).map(row);
+    let rows = last.into_iter().flat_map(|last| &last.sigma).map(row);
     std::iter::once(heading.trim_end().to_owned())
         .chain(rows)
         .collect()
+}
+
+/// σ of the magnetometer, if the rows have one.
+fn magnetometer(run: &Run, last: Option<&Reached>) -> Vec<String> {
+    let row = |(name, (sigma, unit)): (&str, &(f64, String))| {
+        format!(
+            "{name:<24}{:>14}",
+            format!("{} {unit}", three_digits(*sigma))
+        )
+    };
+    match last.and_then(|last| last.magnetic.as_ref()) {
+        Some(of) => MAGNETIC.into_iter().zip(of).map(row).collect(),
+        None if run.recording.magnetometer.is_some() => {
+            vec!["mag: not determined yet".to_owned()]
+        }
+        None => Vec::new(),
+    }
 }
 
 /// The last calibration in one line.
@@ -233,7 +271,7 @@ fn coverage(status: &Status) -> Vec<String> {
 pub fn data(status: &Status) -> Value {
     let attained = status.expected.as_ref().ok();
     let last = attained.and_then(|attained| attained.history.last());
-    let sigma = last.into_iter().flat_map(|(_, groups)| groups);
+    let sigma = last.into_iter().flat_map(|last| &last.sigma);
     let sigma =
         sigma.map(|(group, sigma)| (group.key(), sigma.map(|s| s / group.unit_value()).into()));
     json!({

@@ -182,6 +182,7 @@ fn history(
             time,
             estimate: truth + error,
             sigma,
+            magnetic: None,
         }
     };
     (1..=400).map(moment).collect()

@@ -6,8 +6,6 @@ use turncal::imu::{AXES, Sensor};
 
 /// The unit of raw numbers; for these, a scale factor relative to the nominal one is of little use.
 const RAW: &str = "count";
-/// One microtesla, T.
-const MICRO_TESLA: f64 = 1e-6;
 
 /// One row per axis.
 pub fn table(calibration: &Calibration) -> Table {
@@ -39,10 +37,7 @@ pub fn table(calibration: &Calibration) -> Table {
 /// The magnetometer: one row per axis, if it was calibrated.
 pub fn magnetometer(calibration: &Calibration) -> Option<Table> {
     let mag = calibration.mag.as_ref()?;
-    let (per, size) = match &*mag.field.unit {
-        "T" => ("µT", MICRO_TESLA),
-        other => (other, 1.0),
-    };
+    let (_, size) = mag.shown_field();
     let with_sigma = |name: &str, size: f64| {
         let value = mag.get(name)?;
         Some(match mag.sigma_of(name) {
@@ -57,9 +52,12 @@ pub fn magnetometer(calibration: &Calibration) -> Option<Table> {
         let values = values.map(|value| value.unwrap_or_else(|| NONE.to_owned()));
         std::iter::once(format!("mag    {axis}")).chain(values)
     });
-    let unit = &mag.unit;
-    let first = format!("to x, {unit} per {per}");
-    let columns = ["", &first, "to y", "to z", &format!("hard iron, {unit}")];
+    let [of_matrix, of_bias] = mag.shown_units();
+    let (first, last) = (
+        format!("to x, {of_matrix}"),
+        format!("hard iron, {of_bias}"),
+    );
+    let columns = ["", &first, "to y", "to z", &last];
     let rows = rows.map(|row| row.collect::<Vec<_>>());
     Some(Table::new("", columns).section(rows))
 }

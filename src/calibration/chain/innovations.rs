@@ -9,8 +9,8 @@ use super::part::{Whitened, filter_of, part_filters};
 use crate::calibration::constants::{Sites, triangle};
 use crate::calibration::record::Rest;
 use crate::calibration::{
-    CalibrationError, Epoch, Innovation, Known, Linearisation, Posterior, Prior, Problem, Script,
-    to_vector,
+    CalibrationError, Epoch, Innovation, Known, Linearisation, MagneticEstimate, Model, Posterior,
+    Prior, Problem, Script, to_vector,
 };
 
 /// Maximum number of points of the estimate against time.
@@ -65,7 +65,7 @@ impl Filtered<'_> {
             known.learn(&rows);
             if (number + 1) % every == 0 || number + 1 == self.chain.links.len() {
                 let here = known.with(&Sites::none(prior)).ok_or_else(diverged)?;
-                epochs.push(Epoch::new(link.time, &script.at, &here));
+                epochs.push(Epoch::new(link.time, &script.at, &here, &problem.model));
             }
         }
         Ok((innovations, epochs))
@@ -154,12 +154,13 @@ fn rows_of(sites: &Sites, prior: &Prior) -> Option<DMatrix<f64>> {
 }
 
 impl Epoch {
-    fn new(time: f64, at: &Linearisation, posterior: &Posterior) -> Self {
+    fn new(time: f64, at: &Linearisation, posterior: &Posterior, model: &Model) -> Self {
         let variance = posterior.parameter_covariance.diagonal();
         Self {
             time,
             estimate: to_vector(&at.triads) + posterior.parameters,
             sigma: variance.map(|variance| variance.max(0.0).sqrt()),
+            magnetic: MagneticEstimate::new(posterior, at, model).map(|of| of.sigma()),
         }
     }
 }

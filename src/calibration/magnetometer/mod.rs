@@ -9,6 +9,6 @@ mod start;
 mod tests;
 
 pub use alone::{Alone, AtRest, Ellipsoid, PARTS, Up, ellipsoid};
-pub use estimate::MagneticEstimate;
+pub use estimate::{MagneticEstimate, MagneticMatrix};
 pub use prior::MagneticPrior;
 pub use start::with_magnetometer;

@@ -1,18 +1,18 @@
 //! The magnetometer in a calibration file.
 
-use nalgebra::{DMatrix, Matrix3, SVector, Vector3};
+use nalgebra::{DMatrix, Matrix3, SMatrix, SVector, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::calibration::magnetometer::PARTS;
 use crate::calibration::{Ellipsoid, MagneticEstimate};
-use crate::magnetic::{MAGNETIC, MagneticTriad};
+use crate::magnetic::{MAGNETIC, MAGNETOMETER, MagneticTriad};
 use crate::recording::Magnetometer;
 use crate::units::DEGREE;
 
 /// The equation of a magnetometer.
 const EQUATION: &str = "N = matrix * field + bias; field = correction * (N - bias)";
-/// Number of constants of a magnetometer; the others are those of the field.
-const OF_TRIAD: usize = 12;
+/// One microtesla, T.
+const MICRO_TESLA: f64 = 1e-6;
 
 /// A magnetometer in the body frame of the triads, in the quantity of the file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -126,7 +126,7 @@ impl MagRecord {
         let mut record = Self::new(&estimate.triad, known, log)?;
         let relative = known.map_or(0.0, |magnitude| magnitude_sigma / magnitude);
         let unit = |k: usize| match k {
-            OF_TRIAD.. => 1.0 / DEGREE,
+            MAGNETOMETER.. => 1.0 / DEGREE,
             9.. => log.nominal,
             _ => log.nominal / known.unwrap_or(1.0),
         };
@@ -143,10 +143,14 @@ impl MagRecord {
             matrix: rows(&Matrix3::from_fn(|i, j| sigma[3 * i + j])),
             bias: [sigma[9], sigma[10], sigma[11]],
         });
-        record.field.sigma = Some([magnitude_sigma, sigma[OF_TRIAD], sigma[OF_TRIAD + 1]]);
-        record.parameters = (0..OF_TRIAD).map(MagneticTriad::name).collect();
-        let row = |i: usize| (0..OF_TRIAD).map(|j| covariance[(i, j)]).collect();
-        record.covariance = (0..OF_TRIAD).map(row).collect();
+        record.field.sigma = Some([
+            magnitude_sigma,
+            sigma[MAGNETOMETER],
+            sigma[MAGNETOMETER + 1],
+        ]);
+        record.parameters = (0..MAGNETOMETER).map(MagneticTriad::name).collect();
+        let row = |i: usize| (0..MAGNETOMETER).map(|j| covariance[(i, j)]).collect();
+        record.covariance = (0..MAGNETOMETER).map(row).collect();
         Some(record)
     }
 
@@ -156,6 +160,49 @@ impl MagRecord {
         let bias = Vector3::from(self.bias);
         log.values()
             .map(move |(time, value)| (time, correction * (value - bias)))
+    }
+
+    /// Matrix row by row and bias.
+    pub fn vector(&self) -> SVector<f64, MAGNETOMETER> {
+        SVector::from_iterator(self.matrix.as_flattened().iter().chain(&self.bias).copied())
+    }
+
+    /// Covariance of matrix and bias; without correlations if none are stated, zero without σ.
+    pub fn covariance_matrix(&self) -> SMatrix<f64, MAGNETOMETER, MAGNETOMETER> {
+        let sigma = |k: usize| self.sigma_of(&MagneticTriad::name(k)).copied();
+        SMatrix::from_fn(
+            |i, j| match self.covariance.get(i).and_then(|row| row.get(j)) {
+                Some(of) => *of,
+                None if i == j => sigma(i).unwrap_or(0.0).powi(2),
+                None => 0.0,
+            },
+        )
+    }
+
+    /// Unit of the field in tables, and its size in `field.unit`.
+    pub fn shown_field(&self) -> (&str, f64) {
+        match &*self.field.unit {
+            "T" => ("µT", MICRO_TESLA),
+            other => (other, 1.0),
+        }
+    }
+
+    /// Units of matrix and bias in tables.
+    pub fn shown_units(&self) -> [String; 2] {
+        let (field, _) = self.shown_field();
+        [format!("{} per {field}", self.unit), self.unit.clone()]
+    }
+
+    /// RMS 1σ of matrix and bias, each with its unit in tables.
+    pub fn shown_sigma(&self) -> Option<[(f64, String); 2]> {
+        let sigma = self.sigma.as_ref()?;
+        let rms = |of: &[f64]| (of.iter().map(|of| of * of).sum::<f64>() / of.len() as f64).sqrt();
+        let (_, size) = self.shown_field();
+        let [of_matrix, of_bias] = self.shown_units();
+        Some([
+            (rms(sigma.matrix.as_flattened()) * size, of_matrix),
+            (rms(&sigma.bias), of_bias),
+        ])
     }
 
     /// A value by name, such as `mag.matrix.xy`.
@@ -171,7 +218,7 @@ impl MagRecord {
 }
 
 fn named<'a>(name: &str, matrix: &'a [[f64; 3]; 3], bias: &'a [f64; 3]) -> Option<&'a f64> {
-    let place = (0..OF_TRIAD).find(|&k| MagneticTriad::name(k) == name)?;
+    let place = (0..MAGNETOMETER).find(|&k| MagneticTriad::name(k) == name)?;
     matrix.as_flattened().iter().chain(bias).nth(place)
 }
 

@@ -72,7 +72,8 @@ impl Screen {
             if self.told == whole
                 && let Some(next) = status.next
             {
-                self.tell(&format!("next: {}", session::words(next)))?;
+                let (words, reason) = (session::words(next), session::reason(status));
+                self.tell(&format!("next: {words}{reason}"))?;
             }
         }
         Ok(())

@@ -33,7 +33,8 @@ pub fn write(values: &Values) -> Exported {
     ];
     let word = values.record.word().map(|word| word.to_string());
     fields.extend(word.map(|word| ("verdict", text(&word))));
-    for sensor in Sensor::ALL {
+    let triads = Sensor::ALL.into_iter();
+    for sensor in triads.filter(|_| !values.record.is_of_magnetometer()) {
         let mut of_triad = triad(values.record.triad(sensor));
         let matrix = values.correction.matrix.get(sensor);
         of_triad.push(("correction", numbers(3, matrix.as_slice())));

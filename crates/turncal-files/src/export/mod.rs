@@ -37,10 +37,10 @@ pub struct Format {
     pub about: &'static str,
     axes: Axes,
     write: fn(&Values) -> Exported,
-    /// Whether the format can contain a magnetometer without gyros and accelerometers.
-    of_magnetometer: bool,
     /// Temperature dependence that the format omits; `None` for a calibration at one temperature.
     of_temperature: Option<&'static str>,
+    /// Whether the format contains a magnetometer, beside the triads or alone.
+    has_magnetometer: bool,
 }
 
 const fn row(
@@ -56,8 +56,8 @@ const fn row(
         about,
         axes,
         write,
-        of_magnetometer: false,
         of_temperature: None,
+        has_magnetometer: false,
     }
 }
 
@@ -83,7 +83,7 @@ pub static FORMATS: [Format; 15] = [
     row("ros-covariance", "yaml", "Covariances for ROS sensor_msgs/Imu, from the noise of a run", Log, ros::covariance),
     row("imu-filter-madgwick", "yaml", "Magnetometer bias for the ROS package imu_filter_madgwick", Log, ros::madgwick)
         .with_magnetometer(),
-    row("mat", "mat", "A MATLAB structure (MAT file)", RightFrontUp, mat::write),
+    row("mat", "mat", "A MATLAB structure (MAT file)", RightFrontUp, mat::write).with_magnetometer(),
     row("betaflight", "txt", "Accelerometer and magnetometer zeros for Betaflight", Log, autopilot::betaflight)
         .with_magnetometer(),
     row("inav", "txt", "Zeros and gains for INAV", Log, autopilot::inav).with_magnetometer(),
@@ -97,16 +97,16 @@ impl Format {
         FORMATS.iter().find(|format| format.name == name)
     }
 
-    const fn with_magnetometer(self) -> Self {
+    const fn with_temperature(self, omitted: &'static str) -> Self {
         Self {
-            of_magnetometer: true,
+            of_temperature: Some(omitted),
             ..self
         }
     }
 
-    const fn with_temperature(self, omitted: &'static str) -> Self {
+    const fn with_magnetometer(self) -> Self {
         Self {
-            of_temperature: Some(omitted),
+            has_magnetometer: true,
             ..self
         }
     }
@@ -123,7 +123,7 @@ pub fn write(
     format: &Format,
     run: Option<&Run>,
 ) -> Result<Exported, CorrectionError> {
-    if record.is_of_magnetometer() && !format.of_magnetometer {
+    if record.is_of_magnetometer() && !format.has_magnetometer {
         return Err(CorrectionError::MagnetometerAlone);
     }
     let mut exported = (format.write)(&Values::new(record, run, format.axes)?);
@@ -138,6 +138,10 @@ pub fn write(
         };
         let omitted = Some(omitted).filter(|note| !note.is_empty());
         exported.notes.extend(omitted);
+    }
+    if record.mag.is_some() && !format.has_magnetometer {
+        let note = "magnetometer; its values are in calibration.json";
+        exported.notes.push(note.to_owned());
     }
     Ok(exported)
 }

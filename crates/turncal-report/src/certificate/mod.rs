@@ -143,9 +143,13 @@ impl Certificate {
             "This certificate may not be reproduced except in full without approval of the laboratory.",
         ];
         let general = general.into_iter().map(str::to_owned);
+        let magnetometer = self.calibration.mag.as_ref();
+        let magnetometer = magnetometer
+            .map(|_| "This certificate does not cover the magnetometer of the item.".to_owned());
         let of_laboratory = self.laboratory.remarks.clone();
         let findings = remarks::sentences(&self.calibration.findings);
-        general.chain(of_laboratory).chain(findings).collect()
+        let own = general.chain(magnetometer).chain(of_laboratory);
+        own.chain(findings).collect()
     }
 }
 

@@ -70,6 +70,10 @@ pub fn log(run: &Run, survey: &Survey) -> String {
         }
         text += &warming(run);
     }
+    if let Some(log) = &run.recording.magnetometer {
+        let (values, unit) = (log.values().count(), &log.unit);
+        text += &format!(" Magnetometer in {unit}: {} means of 0.1 s.", count(values));
+    }
     text
 }
 

@@ -70,7 +70,7 @@ fn unit(lot: &Lot, place: usize, row: &Row) -> Value {
 fn values(lot: &Lot, row: &Row) -> Map<String, Value> {
     let entry = |quantity: Quantity| {
         let (value, sigma) = shown(quantity, row.sample(quantity)?);
-        let mut entry = json!({ "value": value, "sigma": sigma, "unit": unit_key(quantity) });
+        let mut entry = json!({ "value": value, "sigma": sigma, "unit": unit_key(lot, quantity) });
         if let Some(check) = row.check_of(quantity) {
             entry["verdict"] = json!(check.verdict);
             entry["probability_within"] = json!(check.probability);
@@ -92,7 +92,7 @@ fn quantity(lot: &Lot, of: &Statistics) -> Value {
     let interval = of.scatter.spread.interval;
     let data = json!({
         "name": quantity.name(),
-        "unit": unit_key(quantity),
+        "unit": unit_key(lot, quantity),
         "count": of.count,
         "outliers": of.outliers.iter().map(|&k| &lot.rows[k].unit.name).collect::<Vec<_>>(),
         "mean": mean,

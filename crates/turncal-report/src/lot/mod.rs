@@ -25,7 +25,14 @@ pub fn document(lot: &Lot) -> Document {
     )];
     let failures = lot.failures();
     let failures = failures.map(|(unit, reason)| format!("{}: {reason}", unit.name));
-    document.warnings.items = failures.collect();
+    let without = lot.without_magnetometer();
+    let without = without.map(|(unit, reason)| {
+        format!(
+            "{}: {reason}; turncal compared the other values.",
+            unit.name
+        )
+    });
+    document.warnings.items = failures.chain(without).collect();
     document.both(tables::limits(lot));
     if !is_single {
         document.both(tables::units(lot));

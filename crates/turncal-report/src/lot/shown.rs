@@ -5,6 +5,7 @@ use crate::terms;
 use turncal::calibration::{AuxiliaryKind, Word};
 use turncal::imu::{AXES, InstallationForm, Sensor};
 use turncal::lot::{Lot, Quantity, Sample, Spread, Verdict};
+use turncal::magnetic::MATRIX;
 
 /// Title of a quantity, such as `gyro K x` or `gyro noise x`.
 pub fn title(quantity: Quantity) -> String {
@@ -12,6 +13,10 @@ pub fn title(quantity: Quantity) -> String {
         Quantity::Parameter(index) => short_name(InstallationForm::General, index),
         Quantity::Auxiliary(_) => quantity.name(),
         Quantity::Noise(sensor, axis) => format!("{} noise {}", sensor.name(), AXES[axis]),
+        Quantity::Magnetic(_) => quantity
+            .name()
+            .replace(".bias.", " hard iron ")
+            .replace('.', " "),
     }
 }
 
@@ -30,17 +35,29 @@ fn unit(quantity: Quantity) -> (&'static str, &'static str, f64) {
         }
         Quantity::Noise(Sensor::Gyro, _) => ("°/√h", "deg_per_sqrt_h", DEG_PER_SQRT_H),
         Quantity::Noise(Sensor::Accel, _) => ("µg/√Hz", "ug_per_sqrt_hz", MICRO_G_PER_SQRT_HZ),
+        // The files state the unit.
+        Quantity::Magnetic(_) => ("", "", 1.0),
     }
 }
 
 /// Symbol of the unit of a quantity.
-pub fn symbol(quantity: Quantity) -> &'static str {
-    unit(quantity).0
+pub fn symbol(lot: &Lot, quantity: Quantity) -> String {
+    of_magnetometer(lot, quantity).unwrap_or_else(|| unit(quantity).0.to_owned())
 }
 
 /// The unit as it is written in names of fields in files.
-pub fn unit_key(quantity: Quantity) -> &'static str {
-    unit(quantity).1
+pub fn unit_key(lot: &Lot, quantity: Quantity) -> String {
+    of_magnetometer(lot, quantity).unwrap_or_else(|| unit(quantity).1.to_owned())
+}
+
+/// The unit of a quantity of the magnetometer.
+fn of_magnetometer(lot: &Lot, quantity: Quantity) -> Option<String> {
+    let [of_matrix, of_bias] = lot.magnetic_unit.as_ref()?;
+    match quantity {
+        Quantity::Magnetic(k) if k < MATRIX => Some(of_matrix.clone()),
+        Quantity::Magnetic(_) => Some(of_bias.clone()),
+        _ => None,
+    }
 }
 
 /// Value and σ in the unit of the quantity; for a scale factor, the value is the deviation from nominal.
@@ -82,7 +99,7 @@ pub struct Together {
     pub quantities: Vec<Quantity>,
 }
 
-/// The parameter groups, then the noise of each triad, if any calibration has them.
+/// The parameter groups, then the noise of each triad and the magnetometer, if any calibration has them.
 pub fn together(lot: &Lot) -> Vec<Together> {
     let those = |heading: String, is: &dyn Fn(Quantity) -> bool| {
         let quantities: Vec<Quantity> = lot.quantities().filter(|of| is(*of)).collect();
@@ -99,11 +116,17 @@ pub fn together(lot: &Lot) -> Vec<Together> {
         those(group.titled(), &is)
     });
     let noises = Sensor::ALL.map(|sensor| {
-        let unit = symbol(Quantity::Noise(sensor, 0));
+        let unit = symbol(lot, Quantity::Noise(sensor, 0));
         let is = |of: Quantity| matches!(of, Quantity::Noise(own, _) if own == sensor);
         those(format!("{} noise at rest, {unit}", sensor.name()), &is)
     });
-    let all = groups.chain(noises);
+    let kinds = [("matrix", true), ("hard iron", false)].into_iter();
+    let magnetic = kinds.zip(lot.magnetic_unit.iter().flatten());
+    let magnetic = magnetic.map(|((name, of_matrix), unit)| {
+        let is = |of: Quantity| matches!(of, Quantity::Magnetic(k) if (k < MATRIX) == of_matrix);
+        those(format!("mag {name}, {unit}"), &is)
+    });
+    let all = groups.chain(noises).chain(magnetic);
     all.filter(|of| !of.quantities.is_empty()).collect()
 }
 

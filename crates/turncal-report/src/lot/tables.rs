@@ -127,7 +127,7 @@ fn verdict(row: &Row) -> String {
 pub fn quantities(lot: &Lot) -> Table {
     let mut columns = Columns::<Quantity>(Vec::new());
     columns.push("", title);
-    columns.push("unit", |quantity| symbol(quantity).to_owned());
+    columns.push("unit", |quantity| symbol(lot, quantity));
     let few = || lot.rows.iter().filter(|_| lot.rows.len() <= SIDE_BY_SIDE);
     for row in lot
         .truth
@@ -163,6 +163,7 @@ pub fn quantities(lot: &Lot) -> Table {
     let table = Table::new("Parameters", columns.headings())
         .sections(Sensor::ALL.map(rows))
         .section(others(|of| matches!(of, Quantity::Auxiliary(_))))
+        .section(others(|of| matches!(of, Quantity::Magnetic(_))))
         .section(others(|of| matches!(of, Quantity::Noise(..))));
     notes(lot, table)
 }
@@ -268,24 +269,39 @@ fn notes(lot: &Lot, mut table: Table) -> Table {
             .note("Spread: 1σ between units after subtraction of their σ, or the 95 % limit of the spread if it is \
             not significant.");
     }
-    if let Some(gravity) = lot.shared_gravity.filter(|_| lot.rows.len() > 1) {
-        table = table.note(format!(
-            "The gravity error, which is the same for all calibrations (1σ {} ppm), is part of every σ of \
-             accelerometer K and of the σ of their mean, but not of the scatter or of differences between \
-             calibrations.",
-            sigma(gravity / PPM)
-        ));
-    }
+    table = shared_errors(lot, table);
     match lot.joint {
         Some(joint) => table.note(format!(
-            "All parameters with their correlations: χ²/n {}, n = {}, p = {}. If p is near 0, the calibrations differ \
-             by more than their σ; if p is near 1, the σ are too large.",
+            "All parameters of gyros and accelerometers with their correlations: χ²/n {}, n = {}, p = {}. If p is near \
+             0, the calibrations differ by more than their σ; if p is near 1, the σ are too large.",
             ratio(joint.value / joint.freedom as f64),
             count(joint.freedom),
             chance(joint.p)
         )),
         None => table,
     }
+}
+
+/// Notes on the errors that all calibrations have in common.
+fn shared_errors(lot: &Lot, mut table: Table) -> Table {
+    let (gravity, field) = (lot.shared.gravity, lot.shared.field);
+    for (error, of, quantity) in [
+        ("gravity error", gravity, "accelerometer K"),
+        (
+            "error of the magnetic field",
+            field,
+            "the magnetometer matrix",
+        ),
+    ] {
+        if let Some(of) = of.filter(|_| lot.rows.len() > 1) {
+            table = table.note(format!(
+                "The {error}, which is the same for all calibrations (1σ {} ppm), is part of every σ of {quantity} and \
+                 of the σ of their mean, but not of the scatter or of differences between calibrations.",
+                three_digits(of / PPM)
+            ));
+        }
+    }
+    table
 }
 
 /// For a single unit, all limits (exceeded limits first); for several units, only limits that are exceeded or
@@ -299,7 +315,7 @@ pub fn limits(lot: &Lot) -> Table {
         cells![
             row.unit.name.as_str(),
             title(quantity),
-            symbol(quantity),
+            symbol(lot, quantity),
             off.unwrap_or_else(|| NONE.to_owned()),
             format!("±{}", stated(in_unit(quantity, check.limit.within))),
             or_dash(check.probability, |p| value(p, 0.01)),

@@ -6,6 +6,8 @@
 //! decomposition of the accelerometers' `K C` (Golub, Van Loan, *Matrix Computations*, 4th ed., §5.2). Biases and the
 //! row norms of `K C` (and thus the scale factors of the general form) are the same in every frame.
 
+mod magnetic;
+
 use std::collections::BTreeMap;
 
 use nalgebra::{Matrix3, Vector3};
@@ -17,6 +19,8 @@ use crate::calibration::{
     in_general_form, parameter, to_vector,
 };
 use crate::imu::{AXES, BodyFrame, InstallationForm, Nominal, PerSensor, Sensor, Triad};
+
+pub use magnetic::{MagneticValues, magnetic_in};
 
 /// A calibration file, and the name that messages use for it.
 #[derive(Debug, Clone, Copy)]

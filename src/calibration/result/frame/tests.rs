@@ -5,7 +5,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
 use crate::attitude;
-use crate::calibration::result::TriadRecord;
+use crate::calibration::result::{MagRecord, TriadRecord};
 use crate::calibration::{parameter_name, sensor_and_parameter};
 use crate::imu::{Instrument, Prior};
 
@@ -302,4 +302,55 @@ fn other_units_are_an_error_that_names_both_and_units_not_stated_are_none() {
     }
     b.unit = None;
     assert!(compared(&b).is_ok());
+}
+
+/// A magnetometer with these rows along the body axes; no σ.
+fn magnetometer(matrix: Matrix3<f64>) -> MagRecord {
+    let triad = crate::magnetic::MagneticTriad {
+        matrix,
+        bias: Vector3::new(3.0, -2.0, 1.0),
+        angles: nalgebra::Vector2::zeros(),
+    };
+    let log = crate::recording::Magnetometer::new("uT", 1.0);
+    MagRecord::new(&triad, None, &log).unwrap()
+}
+
+#[test]
+fn a_magnetometer_has_the_same_matrix_from_every_body_frame_and_the_sigma_of_the_frame() {
+    let record = with_covariance(record(), InstallationForm::General);
+    let matrix = Matrix3::new(0.2, 1.1, -0.1, -0.9, 0.1, 0.05, 0.03, -0.2, 1.3);
+    let rotation = attitude::exp(Vector3::new(0.02, -0.03, 0.05));
+    let nominal = own_nominal(&record);
+    let of = |mag: &MagRecord, record: &Calibration| {
+        magnetic_in(BodyFrame::Accelerometer, (mag, record), &nominal)
+    };
+    let here = of(&magnetometer(matrix), &record);
+    let turned = magnetometer(matrix * rotation.transpose());
+    let there = of(&turned, &seen_from(&record, &rotation));
+    assert!((here[0] - there[0]).amax() < 1e-12);
+    assert_eq!(here[1].amax(), 0.0);
+    // A magnetometer without errors has those of the accelerometers that define the frame.
+    let mut exact = magnetometer(matrix);
+    exact.sigma = Some(crate::calibration::result::MagSigma {
+        matrix: [[0.0; 3]; 3],
+        bias: [0.0; 3],
+    });
+    let [_, sigma] = of(&exact, &record);
+    let covariance = record.covariance_by(&nominal).unwrap();
+    let mut rng = ChaCha8Rng::seed_from_u64(7);
+    let root = covariance.cholesky().unwrap().l();
+    let draws = (0..4000).map(|_| {
+        let white = ParameterVector::from_fn(|_, _| StandardNormal.sample(&mut rng));
+        let at = to_vector(&triads_of(&record, &nominal, InstallationForm::General));
+        let triads = from_vector(InstallationForm::General, &(at + root * white));
+        let frame = accelerometer_frame(&triads.accel.sensitivity());
+        (matrix * frame.transpose())[(0, 0)] - here[0][0]
+    });
+    let rms = (draws.map(|off| off * off).sum::<f64>() / 4000.0).sqrt();
+    assert!(
+        (rms / sigma[0] - 1.0).abs() < 0.05,
+        "{rms:e} {:e}",
+        sigma[0]
+    );
+    assert_eq!(sigma[9], 0.0);
 }
