@@ -353,7 +353,7 @@ fn the_size_of_a_count_may_be_stated_and_a_unit_that_is_none_is_refused() {
         &[
             "gyro_unit = \"count\"  # as stated",
             // The magnetometer turns with the gyros as gravity does, with another order of axes.
-            "accel = [\"1\", \"2\", \"3\"], mag = [\"7\", \"8\", \"9\"]",
+            "columns = { gyro = [\"4\", \"5\", \"6\"], accel = [\"1\", \"2\", \"3\"], mag = [\"7\", ",
             "scale = 7505.747",
         ],
     );

@@ -90,7 +90,6 @@ fn a_magnetometer_alone_is_calibrated_and_its_exports_give_the_field() {
         serde_json::from_slice(&fs::read(at.join("out/calibration.json")).unwrap()).unwrap();
     let mag = &json["mag"];
     let number = |value: &Value| value.as_f64().unwrap();
-    let size = matrix().determinant().cbrt();
     for (i, j) in (0..9).map(|k| (k / 3, k % 3)) {
         let (off, sigma) = (
             number(&mag["matrix"][i][j]) - FIELD * MATRIX[i][j],
@@ -128,9 +127,10 @@ fn a_magnetometer_alone_is_calibrated_and_its_exports_give_the_field() {
             .contains("hard iron, uT")
     );
     assert!(of(&["check", "out/run.toml"]).1.contains("hard iron, uT"));
+    // Gauss along front, right, down of the chip; minus milligauss along those of the vehicle.
     for (format, key, per_ut) in [
         ("px4", "CAL_MAG0_XOFF", 0.01),
-        ("ardupilot", "COMPASS_OFS_Y", 0.0),
+        ("ardupilot", "COMPASS_OFS_Y", -10.0),
         ("c", "turncal_mag_bias", 1.0),
     ] {
         let (done, exported, said) = of(&["export", "out/calibration.json", "--format", format]);
@@ -143,7 +143,7 @@ fn a_magnetometer_alone_is_calibrated_and_its_exports_give_the_field() {
         let rest = exported.split_once(key).unwrap().1;
         let of_key = numbers(rest.trim_start_matches("[3] = "))[0];
         assert!(
-            per_ut == 0.0 || (of_key - per_ut * HARD_IRON[0]).abs() < 0.1 * per_ut,
+            (of_key - per_ut * HARD_IRON[0]).abs() < 0.1 * f64::abs(per_ut),
             "{of_key}"
         );
     }
@@ -165,7 +165,6 @@ fn a_magnetometer_alone_is_calibrated_and_its_exports_give_the_field() {
         let (done, _, said) = of(arguments);
         assert!(!done && said.contains("magnetometer"), "{said}");
     }
-    assert!(size > 0.0);
 }
 
 #[test]
@@ -255,6 +254,9 @@ fn names_of_many_programs_are_those_of_a_magnetometer() {
     }
 }
 
+/// Further columns of a row.
+type Columns<'a> = &'a dyn Fn(usize) -> Vec<f64>;
+
 /// The nine columns of a recording, row by row, and the attitude of each row from its gyros.
 fn nine_columns(recording: &Recording) -> (Vec<Vec<f64>>, Vec<UnitQuaternion<f64>>) {
     let imu = &recording.imu;
@@ -287,7 +289,7 @@ fn columns_that_turn_as_a_field_are_a_magnetometer_and_attitudes_are_not() {
         .run;
     let (nine, attitudes) = nine_columns(&run.recording);
     let directory = tempfile::tempdir().unwrap();
-    let draft = |others: &dyn Fn(usize) -> Vec<f64>| {
+    let draft = |others: Columns| {
         let row = |k: usize| [&nine[k][..6], &others(k)].concat();
         let mut text = String::new();
         for k in 0..nine.len() {
@@ -319,7 +321,7 @@ fn columns_that_turn_as_a_field_are_a_magnetometer_and_attitudes_are_not() {
         let (roll, pitch, yaw) = attitudes[k].euler_angles();
         vec![roll.to_degrees(), pitch.to_degrees(), yaw.to_degrees()]
     };
-    let not: [(&str, &dyn Fn(usize) -> Vec<f64>); 8] = [
+    let not: [(&str, Columns); 8] = [
         ("quaternion", &|k| attitudes[k].coords.as_slice().to_vec()),
         ("its vector part", &|k| {
             attitudes[k].coords.as_slice()[..3].to_vec()
