@@ -31,6 +31,8 @@ pub struct Magnetometer {
     pub disturbance: f64,
     /// Step of the values on each axis, T; zero if they have none.
     pub step: Vector3<f64>,
+    /// Whether the times of the values are known; otherwise, they are numbers of rows.
+    pub has_times: bool,
     /// Start of the first span and length of each, s.
     start: f64,
     length: f64,
@@ -82,6 +84,7 @@ impl Magnetometer {
             field: None,
             disturbance: 0.0,
             step: Vector3::zeros(),
+            has_times: true,
             start: 0.0,
             length: SPAN,
             spans: Vec::new(),

@@ -115,6 +115,15 @@ fn a_magnetometer_alone_is_calibrated_and_its_exports_give_the_field() {
     // Rows along the axes of the sensor, of magnitude one.
     let (_, applied, _) = of(&["apply", "out/calibration.json", "mag.csv"]);
     assert_eq!(applied.lines().count(), values.len() + 1);
+    assert!(applied.starts_with("time_s,mag_x,mag_y,mag_z"), "{applied}");
+    // Without times, rows have numbers; what `apply` writes, `calibrate` reads.
+    fs::write(at.join("bare.txt"), text("", "\t", &rows(&values))).unwrap();
+    let (_, numbered, _) = of(&["apply", "out/calibration.json", "bare.txt"]);
+    assert!(numbered.starts_with("row,mag_x,mag_y,mag_z"), "{numbered}");
+    assert!(numbered.contains("\n400,"), "{numbered}");
+    fs::write(at.join("applied.csv"), numbered).unwrap();
+    let (_, again, said) = of(&["calibrate", "applied.csv", "-o", "again"]);
+    assert!(again.contains("GOOD"), "{again}{said}");
     let first = numbers(applied.lines().nth(1).unwrap());
     let expected = matrix().try_inverse().unwrap() * (values[0] - Vector3::from(HARD_IRON)) / FIELD;
     assert!(

@@ -63,7 +63,7 @@ pub enum CorrectionError {
     /// Gyros and accelerometers were not calibrated.
     #[error(
         "the calibration has only a magnetometer, but gyros and accelerometers are needed here. Export it as c, text, \
-         px4, ardupilot, betaflight, inav or imu-filter-madgwick, or use `turncal apply`"
+         mat, px4, ardupilot, betaflight, inav or imu-filter-madgwick, or use `turncal apply`"
     )]
     MagnetometerAlone,
     /// An unknown constant.

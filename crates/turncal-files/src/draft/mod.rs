@@ -251,6 +251,7 @@ impl Draft {
             Some(rows) => draft.take_rows(&rows, &sheet),
             None => draft.quantities.state(stated),
         }
+        draft.ignore_row_numbers();
         if let Some(streams) = &draft.streams {
             draft.columns.names.clone_from(&streams.names);
             if let Some(time) = &streams.time {
@@ -358,6 +359,15 @@ impl Draft {
         let triads = &self.columns.triads;
         let none = triads.gyro.is_none() && triads.accel.is_none();
         none && !self.is_of_magnetometer() || triads.get(sensor).is_some()
+    }
+
+    /// Drops a time that counts rows: a magnetometer alone needs no times.
+    fn ignore_row_numbers(&mut self) {
+        let clock = &self.clock;
+        if clock.unit == "count" && clock.period.is_none() && self.is_of_magnetometer() {
+            self.columns.time = None;
+            "s".clone_into(&mut self.clock.unit);
+        }
     }
 
     /// Whether the log has a magnetometer, but neither gyros nor accelerometers.

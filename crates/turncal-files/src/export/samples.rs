@@ -56,14 +56,19 @@ pub struct FieldSamples<'a> {
 }
 
 impl FieldSamples<'_> {
-    /// Writes one row per value, with its time.
+    /// Writes one row per value, with its time or, if the log has no times, its number from one.
     pub fn rows(&self, file: &mut dyn Write) -> io::Result<()> {
         let columns = in_unit(&self.mag.field.unit);
         let verdict = self.verdict.map(|word| format!(",{}", word.column()));
         let one = if verdict.is_some() { ",1" } else { "" };
-        writeln!(file, "time_s{columns}{}", verdict.unwrap_or_default())?;
-        for (time, field) in self.mag.corrected(self.log) {
-            let time = nanoseconds(time);
+        let first = if self.log.has_times { "time_s" } else { "row" };
+        writeln!(file, "{first}{columns}{}", verdict.unwrap_or_default())?;
+        for (row, (time, field)) in (1..).zip(self.mag.corrected(self.log)) {
+            let time = if self.log.has_times {
+                nanoseconds(time)
+            } else {
+                f64::from(row)
+            };
             writeln!(file, "{time},{},{},{}{one}", field.x, field.y, field.z)?;
         }
         Ok(())

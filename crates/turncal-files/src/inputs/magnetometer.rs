@@ -59,6 +59,7 @@ impl<'a> Fields<'a> {
         let mut empty = Magnetometer::new(unit, nominal);
         empty.disturbance = stated.map_or(0.0, |stated| stated.0 * of_key);
         empty.field = self.field(site);
+        empty.has_times = clock.column.is_some() || imu.sample_period_s.is_some();
         let instance = imu.instance.as_ref().filter(|_| !is_separate);
         Ok(Some(MagnetometerLog {
             source,
