@@ -252,14 +252,7 @@ impl Draft {
             None => draft.quantities.state(stated),
         }
         draft.ignore_row_numbers();
-        if let Some(streams) = &draft.streams {
-            draft.columns.names.clone_from(&streams.names);
-            if let Some(time) = &streams.time {
-                draft.clock.unit.clone_from(&time.gyro.1);
-                "stated in the file".clone_into(&mut draft.clock.why);
-                draft.clock.certainty = Certainty::Certain;
-            }
-        }
+        draft.take_streams();
         draft
     }
 
@@ -359,6 +352,18 @@ impl Draft {
         let triads = &self.columns.triads;
         let none = triads.gyro.is_none() && triads.accel.is_none();
         none && !self.is_of_magnetometer() || triads.get(sensor).is_some()
+    }
+
+    /// Takes names and the unit of time from streams.
+    fn take_streams(&mut self) {
+        if let Some(streams) = &self.streams {
+            self.columns.names.clone_from(&streams.names);
+            if let Some(time) = &streams.time {
+                self.clock.unit.clone_from(&time.gyro.1);
+                "stated in the file".clone_into(&mut self.clock.why);
+                self.clock.certainty = Certainty::Certain;
+            }
+        }
     }
 
     /// Drops a time that counts rows: a magnetometer alone needs no times.
