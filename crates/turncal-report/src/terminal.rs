@@ -84,7 +84,12 @@ fn at_most(count: usize, mut lines: Vec<String>, width: usize) -> impl Iterator<
     if lines.len() > count {
         lines.truncate(count);
         let last = lines.pop().unwrap_or_default();
-        lines.push(cut(&format!("{last} …"), width));
+        let blank = if display_width(&last) + 2 > width {
+            ""
+        } else {
+            " "
+        };
+        lines.push(cut(&format!("{last}{blank}…"), width));
     }
     lines.into_iter()
 }
@@ -374,5 +379,17 @@ mod tests {
         assert_eq!(printable("a\u{1b}[31mb\nc"), "a\\u{1b}[31mb\nc");
         assert_eq!(printable("\u{9b}2J\u{202e}\r"), "\\u{9b}2J\\u{202e}\\r");
         assert_eq!(printable("µg °/√h ″"), "µg °/√h ″");
+    }
+
+    #[test]
+    fn a_line_that_is_cut_ends_in_one_ellipsis() {
+        for length in 5..12 {
+            let lines = vec!["x".repeat(length), "further".to_owned()];
+            let shown: Vec<String> = at_most(1, lines, 10).collect();
+            assert_eq!(shown.len(), 1);
+            assert!(display_width(&shown[0]) <= 10, "{shown:?}");
+            assert_eq!(shown[0].matches('…').count(), 1, "{shown:?}");
+            assert!(shown[0].ends_with('…'));
+        }
     }
 }
