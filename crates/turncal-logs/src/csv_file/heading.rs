@@ -2,11 +2,11 @@
 
 use super::clock_text::ClockText;
 use super::delimiter::Delimiter;
-use super::lines::{Line, Stop};
-use super::look::{Layout, Look, text_of};
+use super::lines::Stop;
+use super::look::{Layout, Look, Looks};
 use super::names::Named;
 use super::preamble::{lone_rate, orientation, rate, units_with};
-use super::shape::{Added, Labelled, SEPARATOR, Sample, Stream};
+use super::shape::Stream;
 use super::tags::Tags;
 
 /// Content of a text file.
@@ -33,41 +33,7 @@ pub struct Heading {
     pub rows: usize,
 }
 
-/// The parsed first lines of a text file.
-pub struct Looks(pub Vec<Look>);
-
 impl Looks {
-    pub fn of<'a>(lines: impl Iterator<Item = &'a Line>) -> Self {
-        Self(lines.map(Look::of).collect())
-    }
-
-    /// The samples of a labelled stream, and the other lines.
-    pub fn of_stream<'a>(
-        lines: impl Iterator<Item = &'a Line>,
-        labelled: &Labelled,
-        stream: &Stream,
-    ) -> Self {
-        let mut sample = Sample::default();
-        let looks = lines.filter_map(|line| {
-            let mut text = line.text.clone();
-            match sample.add(labelled, stream, &mut text) {
-                Added::Complete => {
-                    let text = text_of(&text);
-                    Some(Look {
-                        number: line.number,
-                        is_comment: false,
-                        delimiter: Delimiter::Byte(SEPARATOR),
-                        fields: Delimiter::Byte(SEPARATOR).fields(&text),
-                        text,
-                    })
-                }
-                Added::Part | Added::Other => None,
-                Added::Nothing => Some(Look::of(line)),
-            }
-        });
-        Self(looks.collect())
-    }
-
     /// Heading of all rows, of the rows with a tag, or of the samples of a labelled stream; `None` for a file without
     /// rows.
     pub fn heading(

@@ -1,10 +1,11 @@
-//! A parsed line, and the layout that most rows have.
+//! The parsed first lines of a text file, and the layout that most rows have.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::delimiter::{Delimiter, is_number};
 use super::lines::{Line, Stop};
 use super::row::Malformed;
+use super::shape::{Added, Labelled, SEPARATOR, Sample, Stream};
 
 /// Number of rows at the end of the first lines that define the row format.
 const ROWS: usize = 64;
@@ -81,6 +82,42 @@ impl Look {
     }
 }
 
+/// The parsed first lines of a text file.
+pub struct Looks(pub Vec<Look>);
+
+impl Looks {
+    pub fn of<'a>(lines: impl Iterator<Item = &'a Line>) -> Self {
+        Self(lines.map(Look::of).collect())
+    }
+
+    /// The samples of a labelled stream, and the other lines.
+    pub fn of_stream<'a>(
+        lines: impl Iterator<Item = &'a Line>,
+        labelled: &Labelled,
+        stream: &Stream,
+    ) -> Self {
+        let mut sample = Sample::default();
+        let looks = lines.filter_map(|line| {
+            let mut text = line.text.clone();
+            match sample.add(labelled, stream, &mut text) {
+                Added::Complete => {
+                    let text = text_of(&text);
+                    Some(Look {
+                        number: line.number,
+                        is_comment: false,
+                        delimiter: Delimiter::Byte(SEPARATOR),
+                        fields: Delimiter::Byte(SEPARATOR).fields(&text),
+                        text,
+                    })
+                }
+                Added::Part | Added::Other => None,
+                Added::Nothing => Some(Look::of(line)),
+            }
+        });
+        Self(looks.collect())
+    }
+}
+
 /// The layout that most rows have.
 pub struct Layout {
     pub delimiter: Delimiter,
@@ -148,7 +185,7 @@ impl Layout {
 }
 
 /// A text in UTF-8, otherwise in Latin 1 (the first 256 characters of Unicode).
-pub fn text_of(bytes: &[u8]) -> String {
+fn text_of(bytes: &[u8]) -> String {
     match std::str::from_utf8(bytes) {
         Ok(text) => text.to_owned(),
         Err(_) => bytes.iter().map(|&byte| char::from(byte)).collect(),

@@ -1,9 +1,8 @@
 //! Names and units of the columns, from the lines above the rows.
 
 use super::delimiter::{Delimiter, is_number};
-use super::heading::Looks;
 use super::lines::Stop;
-use super::look::Layout;
+use super::look::{Layout, Looks};
 use super::shape::Stream;
 use super::tags::Tags;
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::delimiter::is_number;
-use super::heading::Looks;
+use super::look::Looks;
 
 /// Minimum number of columns for a time and both triads.
 const BOTH_TRIADS: usize = 7;
