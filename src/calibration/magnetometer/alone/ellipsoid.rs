@@ -32,7 +32,7 @@ pub struct Ellipsoid {
     pub residual: f64,
     /// Number of values.
     pub count: usize,
-    /// Parts of the sphere in which no corrected value lies, out of [`PARTS`] equal parts: the direction of each.
+    /// Parts of the sphere in which no corrected value lies, out of twenty equal parts: the direction of each.
     pub unseen: Vec<Vector3<f64>>,
     /// Variance of the squared magnitudes of the values, in units of the variance along each axis.
     pub spread: f64,
