@@ -78,6 +78,14 @@ pub fn student_limit(degrees: f64, chance: f64) -> f64 {
     }
 }
 
+/// Factor by which the correlation of successive values increases the variance of their mean, from their correlations at
+/// lags 1, 2, …, found from this many values. Correlations count as long as they are significant: those of white noise
+/// are beyond the limit with p < 0.3 %.
+pub fn correlation_factor(correlations: impl Iterator<Item = f64>, count: usize) -> f64 {
+    let chance = 3.0 / (count.max(1) as f64).sqrt();
+    1.0 + 2.0 * correlations.take_while(|&of| of > chance).sum::<f64>()
+}
+
 /// The median of these numbers; the list is reordered. `None` for an empty list.
 pub fn median(values: &mut [f64]) -> Option<f64> {
     (!values.is_empty()).then(|| Data::new(values).median())

@@ -81,6 +81,16 @@ impl MagneticTriad {
         }
     }
 
+    /// The change of N constants, of which the matrix is the first, to axes to which this rotation turns the field.
+    pub fn to_axes<const N: usize>(rotation: &Matrix3<f64>) -> SMatrix<f64, N, N> {
+        let mut all = SMatrix::<f64, N, N>::identity();
+        for row in (0..MATRIX).step_by(3) {
+            let mut block = all.view_mut((row, row), (3, 3));
+            block.copy_from(rotation);
+        }
+        all
+    }
+
     /// Name of a constant, such as `mag.matrix.xy`.
     pub fn name(constant: usize) -> String {
         match constant {

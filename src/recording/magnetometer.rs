@@ -5,7 +5,7 @@ use std::ops::Range;
 use nalgebra::Vector3;
 
 use crate::magnetic::LocalField;
-use crate::statistics::median;
+use crate::statistics::{correlation_factor, median};
 
 /// Length of a span, s.
 const SPAN: f64 = 0.1;
@@ -151,14 +151,14 @@ impl Magnetometer {
     /// Noise in these dwells: the median variance, and the correlation of all.
     pub fn noise(&self, dwells: impl Iterator<Item = Range<f64>>) -> MagneticNoise {
         let mut variances = [(); 3].map(|()| Vec::new());
-        let (mut products, mut pairs) = ([0.0; LAGS], 0u32);
+        let (mut products, mut pairs) = ([0.0; LAGS], 0);
         for time in dwells {
             let means = self.means(&time);
             let (mean, variance) = moments(&means);
             if means.len() < 3 {
                 continue;
             }
-            pairs += 3 * means.len() as u32;
+            pairs += 3 * means.len();
             for axis in 0..3 {
                 variances[axis].push(variance[axis]);
                 // A dwell with motion must not hide the correlation of the others.
@@ -170,13 +170,10 @@ impl Magnetometer {
                 }
             }
         }
-        // The correlation of white noise is beyond this with p < 0.3 %.
-        let chance = 3.0 / f64::from(pairs.max(1)).sqrt();
-        let significant = products[1..].iter().map(|sum| sum / products[0]);
-        let significant = significant.take_while(|&correlation| correlation > chance);
+        let correlations = products[1..].iter().map(|sum| sum / products[0]);
         MagneticNoise {
             variance: Vector3::from(variances.map(|mut of| median(&mut of).unwrap_or(0.0))),
-            correlation: 1.0 + 2.0 * significant.sum::<f64>(),
+            correlation: correlation_factor(correlations, pairs),
         }
     }
 

@@ -69,8 +69,10 @@ fn findings(all: &[Finding], width: usize, room: usize) -> Vec<String> {
             more = at_most(room, more, width).collect();
         }
         if place == SHOWN || (place > 0 && !fits) {
-            let codes: Vec<&str> = all[place..].iter().map(|of| of.code.as_str()).collect();
-            let more = format!("{CODE}and {} more: {}", codes.len(), codes.join(", "));
+            let count = all.len() - place;
+            let mut codes: Vec<&str> = all[place..].iter().map(|of| of.code.as_str()).collect();
+            codes.dedup();
+            let more = format!("{CODE}and {count} more: {}", codes.join(", "));
             lines.push(cut(&more, width));
             break;
         }

@@ -58,10 +58,7 @@ impl MagneticEstimate {
 
     /// The estimate along other axes, to which this matrix turns the field.
     pub fn along(&self, axes: &Matrix3<f64>) -> Self {
-        let mut by_matrix = MagneticMatrix::identity();
-        for row in [0, 3, 6] {
-            by_matrix.fixed_view_mut::<3, 3>(row, row).copy_from(axes);
-        }
+        let by_matrix: MagneticMatrix = MagneticTriad::to_axes(axes);
         let mut turned = self.clone();
         turned.triad.matrix *= axes.transpose();
         turned.covariance = by_matrix * self.covariance * by_matrix.transpose();

@@ -66,6 +66,9 @@ pub enum CorrectionError {
          mat, px4, ardupilot, betaflight, inav or imu-filter-madgwick, or use `turncal apply`"
     )]
     MagnetometerAlone,
+    /// A program cannot apply a magnetometer, and there is nothing else to export.
+    #[error("the magnetometer cannot be exported: {0}")]
+    MagnetometerUnsuitable(String),
     /// An unknown constant.
     #[error(
         "`{0}` in terms is not a parameter of a known error term. Calibrate again with this version, or remove the \

@@ -1,7 +1,7 @@
 //! `turncal apply`
 
 use std::ops::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use clap::error::ErrorKind;
@@ -84,14 +84,8 @@ impl Apply {
             magnetometer: magnetometer(&record, &run).map(|(of, _)| of),
             verdict: record.word(),
         };
-        match &self.output {
-            Some(output) => {
-                keep(
-                    output,
-                    run.recording.files.iter().chain([&self.calibration]),
-                )?;
-                samples.write(output, self.force)?;
-            }
+        match self.kept(&run)? {
+            Some(output) => samples.write(output, self.force)?,
             None => stream(|rows| samples.rows(rows))?,
         }
         drop(activity);
@@ -132,14 +126,8 @@ impl Apply {
             log,
             verdict: record.word(),
         };
-        match &self.output {
-            Some(output) => {
-                keep(
-                    output,
-                    run.recording.files.iter().chain([&self.calibration]),
-                )?;
-                samples.write(output, self.force)?;
-            }
+        match self.kept(run)? {
+            Some(output) => samples.write(output, self.force)?,
             None => stream(|rows| samples.rows(rows))?,
         }
         tell!(
@@ -147,6 +135,16 @@ impl Apply {
             count(log.values().count())
         );
         Ok(())
+    }
+
+    /// The output file, if any; no input may have its name.
+    fn kept(&self, run: &Run) -> anyhow::Result<Option<&Path>> {
+        let Some(output) = &self.output else {
+            return Ok(None);
+        };
+        let inputs = run.recording.files.iter().chain([&self.calibration]);
+        keep(output, inputs)?;
+        Ok(Some(output))
     }
 
     /// Exits if the output does not have the name of a CSV file.

@@ -132,13 +132,11 @@ impl Draft {
             ..stated.clone()
         };
         let mut draft = Self::of_sheet(sheet, None, &stated);
-        let columns = &mut draft.columns;
-        let PerSensor { gyro, accel } = columns.triads;
-        let is_of_magnetometer =
-            columns.magnetometer.is_some() && accel.is_none() && gyro.is_none();
-        if is_of_magnetometer {
+        if draft.is_of_magnetometer() {
             return Ok(draft);
         }
+        let columns = &draft.columns;
+        let PerSensor { gyro, accel } = columns.triads;
         if accel.is_none() || gyro.is_some() || columns.time.is_some() {
             let expected =
                 format!("at least {FEWEST_ROWS}, or the mean values of several positions");

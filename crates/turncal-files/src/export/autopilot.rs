@@ -36,19 +36,19 @@ const COUNTS_PER_RAD_S: f64 = 16.4 / DEGREE;
 const INAV_ONE: f64 = 4096.0;
 
 /// What the programs correct of a magnetometer: PX4 gauss, ArduPilot milligauss, Betaflight and INAV counts.
-const PX4: Reads = Reads {
+pub const PX4: Reads = Reads {
     per_tesla: Some(1e4),
     of_chip: true,
 };
-const ARDUPILOT: Reads = Reads {
+pub const ARDUPILOT: Reads = Reads {
     per_tesla: Some(1e7),
     of_chip: false,
 };
-const INAV: Reads = Reads {
+pub const INAV: Reads = Reads {
     per_tesla: None,
     of_chip: true,
 };
-const BETAFLIGHT: Reads = Reads {
+pub const BETAFLIGHT: Reads = Reads {
     per_tesla: None,
     of_chip: false,
 };

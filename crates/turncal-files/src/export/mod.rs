@@ -20,6 +20,7 @@ mod values;
 pub use remarks::Exported;
 pub use samples::{FieldSamples, HEADER, Samples};
 
+use compass::{Reads, compass};
 use turncal::calibration::CorrectionError;
 use turncal::calibration::result::Calibration;
 use turncal::run::Run;
@@ -41,6 +42,8 @@ pub struct Format {
     of_temperature: Option<&'static str>,
     /// Whether the format contains a magnetometer, beside the triads or alone.
     has_magnetometer: bool,
+    /// What the program corrects of a magnetometer, if it limits it.
+    compass: Option<Reads>,
 }
 
 const fn row(
@@ -58,6 +61,7 @@ const fn row(
         write,
         of_temperature: None,
         has_magnetometer: false,
+        compass: None,
     }
 }
 
@@ -74,9 +78,9 @@ pub static FORMATS: [Format; 15] = [
     row("c", "h", "A C99 header with constants and a function", RightFrontUp, code::write).with_temperature("").with_magnetometer(),
     row("text", "txt", "All values with name, σ and unit", RightFrontUp, text::write).with_magnetometer(),
     row("px4", "params", "PX4 parameters: CAL_GYRO0, CAL_ACC0, CAL_MAG0", FrontRightDown, autopilot::px4)
-        .with_temperature(IN_AUTOPILOTS).with_magnetometer(),
+        .with_temperature(IN_AUTOPILOTS).with_compass(autopilot::PX4),
     row("ardupilot", "param", "ArduPilot parameters: INS_GYROFFS, INS_ACCOFFS, INS_ACCSCAL, COMPASS_", FrontRightDown,
-        autopilot::ardupilot).with_temperature(IN_AUTOPILOTS).with_magnetometer(),
+        autopilot::ardupilot).with_temperature(IN_AUTOPILOTS).with_compass(autopilot::ARDUPILOT),
     row("open-vins-kalibr", "yaml", "IMU intrinsics for OpenVINS, with its model kalibr", Log, kalibr::open_vins_kalibr),
     row("open-vins-rpng", "yaml", "IMU intrinsics for OpenVINS, with its model rpng", Log, kalibr::open_vins_rpng),
     row("imu-calib", "yaml", "Accelerometer calibration for the ROS package imu_calib", Log, ros::imu_calib),
@@ -85,8 +89,8 @@ pub static FORMATS: [Format; 15] = [
         .with_magnetometer(),
     row("mat", "mat", "A MATLAB structure (MAT file)", RightFrontUp, mat::write).with_magnetometer(),
     row("betaflight", "txt", "Accelerometer and magnetometer zeros for Betaflight", Log, autopilot::betaflight)
-        .with_magnetometer(),
-    row("inav", "txt", "Zeros and gains for INAV", Log, autopilot::inav).with_magnetometer(),
+        .with_compass(autopilot::BETAFLIGHT),
+    row("inav", "txt", "Zeros and gains for INAV", Log, autopilot::inav).with_compass(autopilot::INAV),
     row("realsense", "bin", "IMU calibration table of a RealSense D400 camera, as written by rs-imu-calibration", Log,
         realsense::write),
 ];
@@ -110,6 +114,13 @@ impl Format {
             ..self
         }
     }
+
+    const fn with_compass(self, reads: Reads) -> Self {
+        Self {
+            compass: Some(reads),
+            ..self.with_magnetometer()
+        }
+    }
 }
 
 /// Writes a calibration in a given format. A run of the same instrument gives noise figures, sample rate and the
@@ -126,7 +137,14 @@ pub fn write(
     if record.is_of_magnetometer() && !format.has_magnetometer {
         return Err(CorrectionError::MagnetometerAlone);
     }
-    let mut exported = (format.write)(&Values::new(record, run, format.axes)?);
+    let values = Values::new(record, run, format.axes)?;
+    let found = format.compass.and_then(|reads| compass(&values, reads));
+    if let Some(Err(why)) = found
+        && record.is_of_magnetometer()
+    {
+        return Err(CorrectionError::MagnetometerUnsuitable(why));
+    }
+    let mut exported = (format.write)(&values);
     if let Some(thermal) = &record.temperature {
         let reference = thermal.range.gyro.reference;
         let omitted = match format.of_temperature {

@@ -10,7 +10,7 @@ use crate::calibration::magnetometer::estimate::MagneticMatrix;
 use crate::calibration::{MagneticEstimate, MagneticPrior};
 use crate::magnetic::MagneticTriad;
 use crate::recording::{MagneticMean, Magnetometer};
-use crate::statistics::{FALSE_ALARM, chi_square_limit};
+use crate::statistics::{FALSE_ALARM, chi_square_limit, correlation_factor};
 
 /// Number of equal parts of the sphere.
 pub const PARTS: usize = 20;
@@ -148,9 +148,6 @@ fn correlation(residuals: &[f64]) -> f64 {
             .map(|(a, b)| a * b)
             .sum::<f64>()
     };
-    let (all, count) = (product(0), residuals.len());
-    // The correlation of white noise is beyond this with p < 0.3 %.
-    let chance = 3.0 / (count as f64).sqrt();
-    let lags = (1..count / 4).map(|lag| product(lag) / all);
-    1.0 + 2.0 * lags.take_while(|&of| of > chance).sum::<f64>()
+    let lags = 1..residuals.len() / 4;
+    correlation_factor(lags.map(|lag| product(lag) / product(0)), residuals.len())
 }

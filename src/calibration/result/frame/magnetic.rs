@@ -1,13 +1,13 @@
 //! Conversion of a magnetometer to a body frame.
 
-use nalgebra::{Matrix3, SMatrix, SVector};
+use nalgebra::SVector;
 
 use super::accelerometer_frame;
 use crate::calibration::parameters::derivatives;
 use crate::calibration::result::{Calibration, MagRecord, triads_of};
 use crate::calibration::{ParameterMatrix, from_vector, to_vector};
 use crate::imu::{BodyFrame, Nominal, PerSensor};
-use crate::magnetic::MAGNETOMETER;
+use crate::magnetic::{MAGNETOMETER, MagneticTriad};
 
 /// Matrix and bias of a magnetometer with their 1σ, zero if none is stated.
 pub type MagneticValues = [SVector<f64, MAGNETOMETER>; 2];
@@ -28,13 +28,15 @@ pub fn magnetic_in(
         nominal,
         record.installation_form.unwrap_or_default(),
     );
+    let to_axes = MagneticTriad::to_axes::<MAGNETOMETER>;
     let rotation = accelerometer_frame(&triads.accel.sensitivity());
     let by_frame = derivatives(&to_vector(&triads), |of| {
         let triads = from_vector(triads.accel.form, of);
-        of_rows(&accelerometer_frame(&triads.accel.sensitivity())) * values
+        let frame = accelerometer_frame(&triads.accel.sensitivity());
+        to_axes(&frame) * values
     });
     let of_frame: ParameterMatrix = record.covariance_by(nominal).unwrap_or_default();
-    let turn = of_rows(&rotation);
+    let turn = to_axes(&rotation);
     let covariance = turn * own * turn.transpose() + by_frame * of_frame * by_frame.transpose();
     let sigma = if mag.sigma.is_some() {
         covariance.diagonal().map(|v| v.max(0.0).sqrt())
@@ -42,14 +44,4 @@ pub fn magnetic_in(
         SVector::zeros()
     };
     [turn * values, sigma]
-}
-
-/// The rotation of each row of the matrix; the bias is the same in every frame.
-fn of_rows(rotation: &Matrix3<f64>) -> SMatrix<f64, MAGNETOMETER, MAGNETOMETER> {
-    let mut all = SMatrix::<f64, MAGNETOMETER, MAGNETOMETER>::identity();
-    for row in 0..3 {
-        all.fixed_view_mut::<3, 3>(3 * row, 3 * row)
-            .copy_from(rotation);
-    }
-    all
 }
